@@ -20,16 +20,16 @@ if TYPE_CHECKING:  # what is not asked for is not imported, which takes a while
 def add_to(commands: Any) -> None:
     """Add the subcommands."""
     sub = add_command(commands, "recover", _recover)
-    sub.add_argument("bag", type=Path)
+    sub.add_argument("bag", type=Path, help="directory or file of a bag")
     add_output(sub, "DIRECTORY", "new directory for the bag (default: BAG_recovered)")
     sub = add_command(commands, "inspect", _inspect)
-    sub.add_argument("bag", type=Path)
+    sub.add_argument("bag", type=Path, help="directory or file of a bag")
     add_json(sub)
     add_file(sub, "FILE.csv", "write states, forces and V as a table; - is the standard output")
     sub.add_argument("--replay", action="store_true", help="also verify it, as `grasp verify` does")
     add_limits(sub)
     sub = add_command(commands, "verify", _verify)
-    sub.add_argument("bag", type=Path)
+    sub.add_argument("bag", type=Path, help="directory or file of a bag")
     add_json(sub)
 
 
@@ -68,7 +68,8 @@ def _recover(options: argparse.Namespace) -> int:
     found = recover(options.bag, new)
     for words in found.left_out:
         print(f"left out: {words}")
-    print(f"{found.ticks} ticks written to {new}")
+    missing = f"; missing are {found.missing}" if found.missing else ""
+    print(f"{found.ticks} ticks written to {new}{missing}")
     return 0
 
 

@@ -44,7 +44,7 @@ def check_output(output: Path | None, endings: Collection[str], force: bool, inp
             if given.exists() and (given.samefile(output) or output.resolve().is_relative_to(given.resolve())):
                 raise Refused(f"-o {output}: is the input; allowed: another file")
         if not force:
-            raise Refused(f"{output}: is there; allowed: a new file, or --force to replace it")
+            raise Refused(f"{output}: already exists; allowed: a new file, or --force to replace it")
 
 
 def check_memory(scene: Scene, sampled: bool, grid: int | None = None) -> None:

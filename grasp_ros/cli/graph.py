@@ -11,7 +11,6 @@ import signal
 import sys
 import time
 from collections.abc import Sequence
-from contextlib import suppress
 from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
@@ -20,10 +19,10 @@ from typing import Any
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene
 from grasp_ros.cli.bags import add_limits, check_limits, keeps
 from grasp_ros.cli.checks import load_scene, prepare
-from grasp_ros.cli.controllers import check_controllers, sides_of
+from grasp_ros.cli.controllers import sides_of
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
 from grasp_ros.graph.host import check_reach, hold, network
-from grasp_ros.graph.parameters import PEER_SECONDS, START_SECONDS, quoted
+from grasp_ros.graph.parameters import PEER_SECONDS, quoted
 from grasp_ros.graph.processes import Graph, GraphError, become
 from grasp_ros.graph.running import Running, check_factor
 from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals
@@ -66,7 +65,7 @@ def add_to(commands: Any) -> None:
     add_limits(sub)
     _add_network(sub)
     sub = add_command(commands, "replay", _replay)
-    sub.add_argument("bag", type=Path)
+    sub.add_argument("bag", type=Path, help="directory or file of a bag")
     sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="seconds of the bag in a second (default 1)")
     _add_network(sub)
     sub = add_command(commands, "watch", _watch)
@@ -104,9 +103,10 @@ def _reach(options: argparse.Namespace) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from grasp_ros.graph.bag.rosbag2 import BagError
+
     _reach(options)
     laws = {f"{side}_controller": place for side, place in sides_of(options.laws).items()}
-    check_controllers(options.laws, START_SECONDS)
     scene = load_scene(options.scene, options.settings)
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
     check_limits(options, lockstep=options.free_running is None)
@@ -126,18 +126,20 @@ def _run(options: argparse.Namespace) -> int:
     )
     try:
         stopped = _live(graph, spent)
-        begun = not stopped or _has_begun(graph.bag)
-    except GraphError as error:
+        if not stopped or _has_begun(graph.bag):
+            return _report(graph, stopped, spent, options)
+    except (GraphError, BagError) as error:
         print(f"grasp: {error}{_what_is_there(graph.bag)}", file=sys.stderr)
         return 1
     except Refused:
         if graph.processes and _is_without_ticks(graph.bag):  # a node refused what it was given
             shutil.rmtree(directory, ignore_errors=True)
+            if options.output is None:
+                with suppress(OSError):  # there are other runs
+                    directory.parent.rmdir()
         raise
-    if not begun:
-        print("grasp: interrupted before the first tick", file=sys.stderr)
-        return 130
-    return _report(graph, stopped, spent, options)
+    print("grasp: interrupted before the first tick", file=sys.stderr)
+    return 130
 
 
 def _has_begun(path: Path) -> bool:
@@ -157,9 +159,12 @@ def _has_ticks(path: Path) -> bool:
 
 def _is_without_ticks(bag: Path) -> bool:
     """Whether there is nothing to keep; a bag that cannot be read may have ticks."""
-    with suppress(Refused):
+    from grasp_ros.graph.bag.rosbag2 import EmptyBagError
+
+    try:
         return not _has_ticks(bag)
-    return False
+    except Refused as error:
+        return isinstance(error, EmptyBagError)
 
 
 def _what_is_there(bag: Path) -> str:

@@ -32,7 +32,7 @@ WIDE = 100.0  # a derivative that grows by more has a logarithmic axis
 def add_to(commands: Any) -> None:
     """Add the subcommand."""
     sub = add_command(commands, "plot", _plot)
-    sub.add_argument("sources", metavar="BAG|FILE.npz|SCENE", nargs="+")
+    sub.add_argument("sources", metavar="BAG|FILE.npz|SCENE", nargs="+", help="what to draw together")
     add_settings(sub)
     sub.add_argument("--sampled", action="store_true", help="scenes: hold each command over a control period")
     sub.add_argument("--method", choices=METHODS, default=EXACT, help="scenes: way to integrate; see `grasp methods`")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from contextlib import chdir
 from typing import Any
 
 import numpy as np
@@ -70,7 +71,7 @@ def _simulate(options: argparse.Namespace) -> int:
     check_output(options.output, (".npz", ".csv"), options.force, [options.scene])
     grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
     prepare()
-    with bar(scene.duration, "s", scene.name) as progress:
+    with chdir("."), bar(scene.duration, "s", scene.name) as progress:  # a law may go elsewhere
         trajectory = simulate(
             scene, grid=grid, sampled=sampled, controllers=controllers, method=options.method, setting=setting,
             max_events=options.max_events, max_work=options.max_work,

@@ -2,7 +2,7 @@
 
 `integrator` is the door. `driver.advance` joins the segments: `flight` between contacts, `contact` in them; `automaton`
 has the modes of pairs and object and every transition. `records` are the values that all of these hand to each other,
-`compensated` moves a state, `tolerances` has every bound by which a rounding decides. `numerics` and `compilation` know
+`compensated` moves a state, `tolerances` has the bounds by which a rounding decides. `numerics` and `compilation` know
 nothing of grasps.
 """
 

@@ -1,6 +1,7 @@
-"""Tolerances: all bounds by which a rounding, or what an accuracy may neglect, decides; each with its reason.
+"""Tolerances: the bounds by which a rounding, or what an accuracy may neglect, decides; each with its reason.
 
-Bounds that only save work, such as how long a search goes on in one way, stand where they are used.
+What a search or a gap knows to a few roundings of its own terms stands where it is used, and so do bounds that only
+save work, such as how long a search goes on in one way.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ SHORT_START = 0.2  # of the time constants, well within those of a short flight
 SHORT_WAY = 0.125  # of a penetration: a longer way has roundings like those of its end
 
 # Taylor steps.
+DEFECT = 100.0  # times accuracy and rounding: what neglected terms may leave of an identity at the end of a step
 NOISE = 100.0 * EPS  # of a polynomial with some tens of terms
 STILL = 2.0**-4  # of a rounding of the fastest velocity: what a step may neglect of each
 CANCELS = 16.0  # times u' at either end: terms so large leave their roundings in what a relaxation ends with

@@ -1,46 +1,47 @@
-"""What can be set at the start of a node with `-p NAME:=VALUE`, in words: for `--help` and `ros2 param describe`."""
+"""What can be set at the start of a node with `-p NAME:=VALUE`: defaults, and meanings in words."""
 
 from __future__ import annotations
 
 import math
 import re
 
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 
 PEER_SECONDS, START_SECONDS = 1.5, 60.0  # without a sign of life of a node, and until it comes
-PEERS = {
-    "peer_timeout_s": f"wall time without a sign of life or an answer ({PEER_SECONDS:g})",
-    "start_timeout_s": f"wall time for peers to come and to answer first; 0: any ({START_SECONDS:g})",
-    "on_silence": "what is done when a peer is gone or silent: end or wait (wait)",
+Settings = dict[str, tuple[bool | float | str, str]]  # default and meaning by name
+PEERS: Settings = {
+    "peer_timeout_s": (PEER_SECONDS, "wall time without a sign of life or an answer"),
+    "start_timeout_s": (START_SECONDS, "wall time for peers to come and to answer first; 0: any"),
+    "on_silence": ("wait", "what is done when a peer is gone or silent: end or wait"),
 }
-MONITORED = {"wait_for_monitor": "start only when a monitor listens; a plant never outruns it (false)"}
-TIMEOUTS = {
-    name: text for side in ("left", "right") for name, text in (
-        (f"{side}_timeout_s", "age of the state that the last command answers, s of simulated time (0.1)"),
-        (f"{side}_on_timeout", "what then acts: hold, zero or stop (zero)"),
-    )
+MONITORED: Settings = {
+    "wait_for_monitor": (False, "start only when a monitor listens; a plant never outruns it"),
 }
-FREE = {  # exist with the wall clock
-    "real_time_factor": "simulated seconds in a second (1)",
-    "wait_for_controllers": "start only when somebody sends the commands of each controller (false)", **TIMEOUTS,
+FREE: Settings = {  # exist with the wall clock
+    "real_time_factor": (1.0, "simulated seconds in a second"),
+    "wait_for_controllers": (False, "start only when somebody sends the commands of each controller"),
 }
-PLANT = {
-    "scene": "name of a scene of the package, or path of a .yaml file (case_01)",
-    "accuracy": "relative size of the first neglected term of a contact (1e-16)", **MONITORED,
-    "paused": "begin paused, at the first state (false)",
-    "progress": "show a progress bar on a terminal (false)",
-    "free_running": "follow the wall clock instead of waiting for the commands (false)", **FREE, **PEERS,
+for side in ("left", "right"):
+    FREE[f"{side}_timeout_s"] = 0.1, "simulated time without a newer command after which another force acts"
+    FREE[f"{side}_on_timeout"] = "zero", "what then acts: hold, zero or stop"
+PLANT: Settings = {
+    "scene": ("case_01", "name of a scene of the package, or path of a .yaml file"),
+    "accuracy": (ACCURACY, "relative size of the first neglected term of a contact"), **MONITORED,
+    "paused": (False, "begin paused, at the first state"),
+    "progress": (False, "show a progress bar on a terminal"),
+    "free_running": (False, "follow the wall clock instead of waiting for the commands"), **FREE, **PEERS,
 }
-CONTROLLER = {
-    **MONITORED, "law": "a law of your own in place of the scene's, module:object", **PEERS,
+CONTROLLER: Settings = {
+    **MONITORED, "law": ("", "a law of your own in place of the scene's, module:object"), **PEERS,
 }
 NODES = {
     "plant": PLANT, "left_controller": CONTROLLER, "right_controller": CONTROLLER,
-    "monitor": {"bag": "directory of the bag; it must not exist (grasp_ and the time)", **PEERS},
+    "monitor": {"bag": ("", "directory of the bag, which must not exist; else grasp_ and the time"), **PEERS},
 }
-TOOLS = {  # which commands of `grasp` become
-    "player": {"bag": "directory of the bag", "rate": "seconds of the bag in a second (1)"},
-    "remote": {"words": "what to ask, a JSON list; empty: what the lines of the standard input say"},
+TOOLS: dict[str, Settings] = {  # which commands of `grasp` become
+    "player": {"bag": ("", "directory of the bag"), "rate": (1.0, "seconds of the bag in a second")},
+    "remote": {"words": ("[]", "what to ask, a JSON list; empty: what the lines of the standard input say")},
     "watch": {},
 }
 PARAMETERS = NODES | TOOLS
@@ -48,7 +49,8 @@ PARAMETERS = NODES | TOOLS
 
 def usage(node: str) -> str:
     """What a node prints when it is asked for help."""
-    rows = [f"  {name:<20} {text}" for name, text in PARAMETERS[node].items()]
+    rows = [f"  {name:<20} {text} ({str(default).lower()})".removesuffix(" ()")
+            for name, (default, text) in PARAMETERS[node].items()]
     if node in NODES and node != "monitor":
         own = "left_arm.position_m" if node == "plant" else f"{node.split('_')[0]}_feedback.position_gain_N_per_m"
         rows += ["", f"Numbers of the scene are parameters, too: -p {own}:=0.4"]

@@ -32,6 +32,7 @@ POLL_SECONDS = 0.02
 NODES_SECONDS = 0.4
 MONITOR_NICE, PRIORITY = 10, 1  # of Linux: the monitor of a free run may be late, the others may not
 LONGEST = 2**16  # bytes of last words
+NO_MEMORY = " (is /dev/shm full?)"
 
 
 def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> NoReturn:
@@ -181,6 +182,8 @@ class Graph:
             time.sleep(POLL_SECONDS)
         if not received:
             self._check()
+            if self.begun is not None and not self.bag.exists():
+                raise GraphError(f"{self.bag}: was removed")
             if not (self.bag / "metadata.yaml").exists():  # a law can end its process, and all nodes with it
                 raise GraphError(f"{awaited[0]}: ended with exit status 0 before the run was over")
 
@@ -202,7 +205,7 @@ class Graph:
                   " get older on busy processors", file=sys.stderr)
 
     def _check(self) -> None:
-        """Nobody has failed, or stands still; the one to name is the first that has said why, or that was killed."""
+        """Fail for the first cause: of the first process that has said why it ends, or was killed, or stands still."""
         ended = {name: process.returncode for name, process in self.processes.items() if process.poll() is not None}
         assert self._lifeline is not None
         with suppress(BlockingIOError):
@@ -211,7 +214,8 @@ class Graph:
                 self._causes.append((when, f"{node}: {why}", status))
         for name, status in ended.items():
             if status < 0:
-                self._causes.append((time.monotonic(), f"{name}: was killed by {signal.Signals(-status).name}", 1))
+                why = f"was killed by {signal.Signals(-status).name}{NO_MEMORY if status == -signal.SIGBUS else ''}"
+                self._causes.append((time.monotonic(), f"{name}: {why}", 1))
         if ended and self._causes:
             _, why, status = min(self._causes)
             raise (Refused if status == 2 else GraphError)(why)

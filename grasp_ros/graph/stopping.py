@@ -102,11 +102,15 @@ def stop_if_signalled() -> None:
         raise KeyboardInterrupt
 
 
-def tell_parent(node: str, why: str, status: int = 1) -> None:
-    """Let the process that started this one know why a node ends early, with what status, and since when."""
+def tell_parent(node: str, why: str, status: int = 1) -> bool:
+    """Let the process that started this one know why a node ends early, with what status, and since when.
+
+    Returns whether there is one.
+    """
     with suppress(OSError):  # it has ended
         for way in _parent:
             os.write(way, json.dumps([time.monotonic(), node, why[:MOST_WORDS], status]).encode())
+    return bool(_parent)
 
 
 def end_with_parent(received: list[int], name: str) -> None:
@@ -121,7 +125,7 @@ def end_with_parent(received: list[int], name: str) -> None:
             while os.read(0, 1):
                 pass
         with suppress(OSError):  # nobody may read it
-            print(f"{name}: what started this process has ended; it ends, too", file=sys.stderr)
+            print(f"{name}: its parent process has ended; it ends, too", file=sys.stderr)
         received.append(signal.SIGHUP)
         end_by_force(name)
 

@@ -140,7 +140,7 @@ def _integrate(
     base: Any = getattr(integrate, name)
 
     class Counting(base):
-        """scipy's solver, which counts its steps and says how far it is."""
+        """scipy's solver, which counts its steps and says how far it is; no output depends on the other ones."""
 
         def step(self) -> Any:
             work[Work.STEPS] += 1
@@ -148,6 +148,10 @@ def _integrate(
             if problem.progress is not None:
                 problem.progress(float(self.t_old))  # an event may lie before its end
             return message
+
+        def dense_output(self) -> Any:
+            found = super().dense_output()  # of several times at once it rounds in another way
+            return lambda t: found(t) if np.ndim(t) == 0 else np.stack([found(one) for one in t], axis=-1)
 
     options = {"jac": jacobian} if name in IMPLICIT else {}
     with warnings.catch_warnings():  # an integration that fails says so in its status

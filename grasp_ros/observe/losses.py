@@ -1,7 +1,8 @@
 """Where the energy of a segment goes: what dampers, feedback, friction and impacts take, and what inputs bring.
 
 In a flight the energy of a body falls by (c + Kv) times the integral of v^2, so that the integral follows from both
-ends. In a step the integrands are polynomials, for which Gauss quadrature of this order leaves no more than rounding.
+ends; where c + Kv takes next to nothing, the velocity itself is integrated. In a step the integrands are polynomials,
+for which Gauss quadrature of this order leaves no more than rounding.
 """
 
 from __future__ import annotations
@@ -13,15 +14,18 @@ import numpy as np
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.driver.energy_check import own_energy
+from grasp_ros.exact.flight.closed_form import fly, launch
 from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.kinematics import approach
 from grasp_ros.exact.numerics.polynomial import values
-from grasp_ros.exact.records import Array
+from grasp_ros.exact.records import Array, Flight
 from grasp_ros.observe.extremes import WORK
 from grasp_ros.observe.record import Seen, SegmentRecord
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, U, V, X
 
 NODES, WEIGHTS = (0.5 * (np.polynomial.legendre.leggauss(16)[0] + 1.0), 0.5 * np.polynomial.legendre.leggauss(16)[1])
+DAMPED = 1e-3  # of m/c: what a damper takes in a shorter time is lost among the roundings of the energy at both ends
+SWUNG = 6.0  # rad, up to which the quadrature follows v^2 to rounding
 
 
 @inlined
@@ -36,30 +40,35 @@ def add_damping(segment: SegmentRecord, seen: Array, body: Body, squares: float)
 
 
 @kernel
-def undamped_squares(row: Array, x: float, v: float, t: float) -> float:
-    """Integral of v^2 over a flight without damping, where the energy does not tell it."""
-    push = (row[Of.FORCE] - row[Of.STIFFNESS] * x) / row[Of.MASS]
-    if row[Of.STIFFNESS] == 0.0:
-        return t * (v * v + t * push * (v + t * push / 3.0))
-    rate = math.sqrt(row[Of.STIFFNESS] / row[Of.MASS])
-    a, b, turn = v, push / rate, rate * t  # v = a cos + b sin
-    sine, cosine = math.sin(turn), math.cos(turn)
-    half = 0.5 * sine * cosine / rate
-    return a * a * (0.5 * t + half) + b * b * (0.5 * t - half) + a * b * sine * sine / rate
-
-
-@kernel
 def flight_squares(segment: SegmentRecord, body: Body) -> float:
     """Integral of v^2 over a flight, m^2/s."""
     row, lane = segment.m.bodies[body], velocity_lane(body)
     x, v, x_end, v_end = segment.m.before[lane - 1], segment.m.before[lane], segment.m.y[lane - 1], segment.m.y[lane]
     if row[Of.MASS] == math.inf:  # an object that sticks
         return 0.0
-    if row[Of.DAMPING] == 0.0:
-        return undamped_squares(row, x, v, segment.t)
-    before = own_energy(row[Of.MASS], row[Of.STIFFNESS], row[Of.FORCE], x, v, 0.0)[0]
-    after = own_energy(row[Of.MASS], row[Of.STIFFNESS], row[Of.FORCE], x_end, v_end, 0.0)[0]
-    return 0.5 * (before - after) / row[Of.DAMPING]
+    if abs(row[Of.DAMPING]) * segment.t > DAMPED * row[Of.MASS]:
+        before = own_energy(row[Of.MASS], row[Of.STIFFNESS], row[Of.FORCE], x, v, 0.0)[0]
+        after = own_energy(row[Of.MASS], row[Of.STIFFNESS], row[Of.FORCE], x_end, v_end, 0.0)[0]
+        return 0.5 * (before - after) / row[Of.DAMPING]
+    flight = launch(row, x, v)
+    if flight.rate * segment.t > SWUNG:
+        return swing_squares(flight, segment.t)
+    total = 0.0
+    for j in range(NODES.shape[0]):
+        total += WEIGHTS[j] * fly(flight, segment.t * NODES[j]).v ** 2
+    return segment.t * total
+
+
+@kernel
+def swing_squares(flight: Flight, t: float) -> float:
+    """The same of an oscillation, v = exp(-sigma t) (a cos + b sin), in closed form."""
+    a, b, p, turn = flight.v, (flight.push - flight.sigma * flight.v) / flight.rate, 2.0 * flight.sigma, flight.rate * t
+    decay, q = math.exp(-p * t), 2.0 * flight.rate
+    cosine, sine = decay * math.cos(2.0 * turn), decay * math.sin(2.0 * turn)
+    mean = t if p == 0.0 else -math.expm1(-p * t) / p
+    real = (p * (1.0 - cosine) + q * sine) / (p * p + q * q)
+    imaginary = (q * (1.0 - cosine) - p * sine) / (p * p + q * q)
+    return 0.5 * ((a * a + b * b) * mean + (a * a - b * b) * real) + a * b * imaginary
 
 
 @inlined

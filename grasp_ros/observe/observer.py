@@ -28,7 +28,7 @@ from grasp_ros.observe.record import (
     memory_at,
     memory_of,
 )
-from grasp_ros.observe.settling import last_of, settled_from, watch_bound
+from grasp_ros.observe.settling import settled_from, watch_bound
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of, Pair, U, X
 
 BEGIN = -2  # in place of a kind of segment
@@ -111,6 +111,9 @@ def begin(m: Memory, bound: float) -> None:
         seen[place] = 0.0
     for q in range(QUANTITIES):
         seen[Seen.LOW + q], seen[Seen.HIGH + q] = math.inf, -math.inf
+    for side in (LEFT, RIGHT):  # a pair may begin closed without force
+        if m.pairs[side, Law.HERTZIAN] > 0.0 and y[U.L + side] > 0.0:
+            seen[Seen.HIGH + U.L + side] = y[U.L + side]
     for place in range(STATES):
         m.before[place] = y[place]
     seen[Seen.LEVEL] = seen[Seen.LEAST] = level(m.loop, m.pairs, y)
@@ -125,7 +128,8 @@ def finish(m: Memory) -> None:
     """What follows at the end of a run: whether the last times outside the bound are the last for good."""
     seen = m.seen
     if m.switches[Switch.WANTED] & Wanted.BOUND.value:
-        seen[Seen.LAST_OUTSIDE] = last_of(seen)
+        for body in (LEFT, OBJECT, RIGHT):
+            seen[Seen.LAST_OUTSIDE + body] = seen[Seen.OUTSIDE + body]
     if m.switches[Switch.CERTAIN] != 0:
         seen[Seen.SETTLED] = settled_from(m, level(m.loop, m.pairs, m.y))
 

@@ -82,7 +82,7 @@ class Problem:
         table = ensemble(self.scene, numbers, self.names, setup=self.setup)
         outcomes: dict[str, Array] = {}
         for name in self.names:
-            worst = np.max([table.columns[column.name] for column in find([name])], axis=0)
+            worst = np.fmax.reduce([table.columns[column.name] for column in find([name])])  # nan: an absent body
             outcomes[name] = np.where(np.isnan(worst), np.inf, worst)  # what no run tells is as bad as can be
         excess: Array = np.zeros(len(table.status))
         for bound in self.bounds:

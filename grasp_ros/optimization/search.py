@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from grasp_ros.simulation.progress import Told, showing
 
 MEMBERS, GENERATIONS = 16, 500  # members of a population for each free number; generations at most
 AGREE = 1e-14  # standard deviation of what a population reaches, relative, at which a search ends
+NEAR, PLATEAU = 1e-5, 50  # parts of the ranges within which it then is; generations for which it goes on elsewhere
 FRONT = 12  # choices along two outcomes
 BROKEN, NOTHING = 1e100, 1e140  # above every outcome: a bound is broken; there is no outcome; squares are finite
 
@@ -109,9 +111,18 @@ def search(problem: Problem, seed: int = 0, progress: Told | None = None) -> Des
             progress(runs)
         return costs(problem, np.ascontiguousarray(parts.T))
 
+    agreed = 0  # generations in a row
+
+    def is_over(intermediate_result: Any) -> bool:
+        """Where all members have the same outcome at different places, one that is better may lie between them."""
+        nonlocal agreed
+        reached, places = intermediate_result.population_energies, intermediate_result.population
+        agreed = agreed + 1 if np.std(reached) <= AGREE * abs(np.mean(reached)) else 0
+        return agreed > (0 if np.ptp(places, axis=0).max() <= NEAR else PLATEAU)
+
     found = differential_evolution(
-        function, [(0.0, 1.0)] * len(problem.axes), popsize=MEMBERS, maxiter=GENERATIONS, tol=AGREE, rng=seed,
-        polish=False, init="sobol", updating="deferred", vectorized=True)
+        function, [(0.0, 1.0)] * len(problem.axes), popsize=MEMBERS, maxiter=GENERATIONS, tol=0.0, atol=-1.0, rng=seed,
+        polish=False, init="sobol", updating="deferred", vectorized=True, callback=is_over)  # never by its own rule
     if found.fun >= BROKEN:
         wish = " and ".join(f"{bound.outcome} <= {bound.most:g}" for bound in problem.bounds)
         stops = problem.found(problem.numbers(found.x[None])).stops

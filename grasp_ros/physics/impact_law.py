@@ -4,9 +4,9 @@
 
 u > 0 is penetration, u' > 0 approach, H in N/m^1.5, p in s/m. Each function works on floats and on NumPy arrays, and
 `exact.impact` compiles the same source for the kernels. `model.impact_force` puts the parts together for any u and u'.
-What else follows from the exponent: powers of w in `exact.contact.series`, `exact.automaton.friction` and
-`sensitivity.contact`, scales of an impact in `exact.contact.step_unit`, times in `exact.automaton.begin` and `domain`,
-the bounds of `reach`, Delta k in `lyapunov`, and the quotients of `methods.discrete_gradient`.
+What else follows from the exponent: powers of w in `exact.contact.series` and `sensitivity.base_series`, scales of an
+impact in `exact.contact.step_unit`, the time of one in `domain`, the bounds of `reach`, and the quotients of
+`methods.discrete_gradient`.
 docs/oracles.md has what proves the law.
 
 References

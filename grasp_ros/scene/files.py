@@ -65,7 +65,7 @@ def writing(path: object, refusal: type[Refused] = Refused) -> Iterator[None]:
     except BrokenPipeError:
         raise
     except FileExistsError:  # of a directory that is to be made
-        raise refusal(f"{path}: is there; allowed: a new directory") from None
+        raise refusal(f"{path}: already exists; allowed: a new directory") from None
     except OSError as error:
         raise refusal(f"{path}: cannot be written: {error.strerror or error}") from None
 

@@ -44,10 +44,11 @@ def read_npz(path: Path) -> dict[str, np.ndarray]:
     What is wrong with it is refused, or raises what `files.DAMAGE` lists.
     """
     found: dict[str, np.ndarray] = {}
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-        total = sum(member.file_size for member in ZipFile(file).infolist())
-        if total > MOST_BYTES:
-            raise Refused(f"{total} bytes of numbers; allowed: at most {MOST_BYTES}")
+    with ZipFile(path) as members:
+        total = sum(member.file_size for member in members.infolist())
+    if total > MOST_BYTES:
+        raise Refused(f"{total} bytes of numbers; allowed: at most {MOST_BYTES}")
+    with np.load(path, allow_pickle=False) as archive:
         for name in archive.files:
             try:
                 found[name] = archive[name]

@@ -116,7 +116,7 @@ def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER, i
             status[i], stops[i] = STATUSES.index(run.status.name), run.stop
     system = variants.scene.system
     runs.state[:, system.absent_columns] = np.nan
-    runs.seen[:, [*(Seen.OUTSIDE + body for body in system.absent),
+    runs.seen[:, [*(first + body for first in (Seen.OUTSIDE, Seen.LAST_OUTSIDE) for body in system.absent),
                   *(first + place for first in (Seen.LOW, Seen.HIGH) for place in system.absent_columns)]] = np.nan
     found = {column.name: np.array(column.read(runs)) for column in columns}
     for name, values in found.items():

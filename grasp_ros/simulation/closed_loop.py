@@ -63,12 +63,12 @@ def check_changes(scene: Scene, held: bool, changes: Changes, by_user: Iterable[
     for tick, numbers in changes.items():
         at = plain(tick)
         is_tick = at is not None and 0 <= at <= scene.ticks and at == int(at)
-        where = f"changes: at tick {tick}"
+        where = f"changes: at tick {tick!r}"
         for name in names(where, [*mapping(where, numbers)]):
             if name.startswith(replaced):
-                raise Refused(f"changes: {name} at tick {tick}: another controller acts in place of this feedback")
+                raise Refused(f"changes: {name} at tick {tick!r}: another controller acts in place of this feedback")
             if name not in live or not is_tick:
-                raise Refused(f"changes: {name} at tick {tick}; allowed: {', '.join(live)} at 0 to {scene.ticks}")
+                raise Refused(f"changes: {name} at tick {tick!r}; allowed: {', '.join(live)} at 0 to {scene.ticks}")
 
 
 def drive_sampled(

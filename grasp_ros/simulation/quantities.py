@@ -88,6 +88,13 @@ def settled_of(run: Trajectory, row: Mapping[str, float] | None) -> Array:
     return last_outside(run.t, run.state[:, 0::2], distance) if (ahead <= distance).all() else np.full(3, np.inf)
 
 
+def last_outside_of(run: Trajectory, row: Mapping[str, float] | None) -> Array:
+    """Last time within a run at which each mass is outside the bound, (3,) in s; without a row by its output times."""
+    if row is not None:  # 0 for a mass that is not there
+        return np.nan_to_num([row[f"last_outside_{NAMES[body]}"] for body in COLUMN], posinf=np.inf)
+    return last_outside(run.t, run.state[:, 0::2], settled_distance(run.scene))
+
+
 def may_rise(run: Trajectory) -> bool:
     """Whether V_c may rise, so that it proves nothing of what follows."""
     return bool(run.controllers or run.scene.caveats(run.sampled))

@@ -11,14 +11,14 @@ from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import OBJECT, Transition
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.simulation.chunk import HORIZONS
 from grasp_ros.simulation.losses import external_work, losses_of, needs_ticks
 from grasp_ros.simulation.outcomes import GROUPS
-from grasp_ros.simulation.quantities import as_row, last_outside, may_rise, may_settle, settled_distance, settled_of
+from grasp_ros.simulation.quantities import as_row, last_outside_of, may_rise, may_settle, settled_distance, settled_of
 from grasp_ros.simulation.repeat import at_every_tick
 from grasp_ros.simulation.trajectory import Trajectory, check_run
 
@@ -33,7 +33,7 @@ def summary(run: Trajectory) -> dict[str, Any]:
     """Numbers of a run by names that end with their unit; what the run does not have is left out.
 
     `settled_s` has infinity where V_c does not prove within `settled_within_s` that a mass has settled. Where V_c may
-    rise, `last_outside_s` has the last times outside the same bound, at output times and control periods, in its place.
+    rise, `last_outside_s` has the last times outside the same bound in its place.
     `touches` is left out for methods that do not look for them. V_c is twice the energy, at two times: half of
     what it falls by between them is what was lost less the work of external forces.
     """
@@ -61,8 +61,8 @@ def summary(run: Trajectory) -> dict[str, Any]:
 def _amounts(run: Trajectory) -> dict[str, Any]:
     """Energies, settling times, largest forces and losses, as far as the scene has them."""
     scene, distance, settles = run.scene, settled_distance(run.scene), may_settle(run)
-    row = as_row(run, *PEAKS, "energy", *(["settling_times"] if settles else []))
-    dense = None if row is not None and settles else _dense(run)
+    row = as_row(run, *PEAKS, "energy", "settling_times" if settles else "last_outside_times")
+    dense = _dense(run) if row is None or needs_ticks(run) else None
     known = run if dense is None else dense
     ends, at = known.state[[0, -1]], known.t[[0, -1]].tolist()
     if row is not None:
@@ -75,11 +75,12 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
     if settles and not np.isnan(settled := settled_of(known, row)).any():
         found["settled_s"] = _by_body(run, settled)
         found["settled_within_s"] = float(run.t[-1]) if row is None else HORIZONS * scene.duration
-    if may_rise(run) and distance > 0.0 and dense is not None:
-        found["last_outside_s"] = _by_body(run, last_outside(dense.t, dense.state[:, 0::2], distance))
+    if may_rise(run) and distance > 0.0 and not (row is None and dense is None):
+        found["last_outside_s"] = _by_body(run, last_outside_of(known, row))
     if row is None:
         found["largest_of"] = OUTPUTS if dense is None else TICKS
-        largest = [*np.abs(known.command).max(axis=0).tolist(), *known.impacts.max(axis=0).tolist()]
+        acted = np.nan_to_num(np.abs(known.inputs[:, [LEFT, RIGHT]]))  # nan: from the end on nothing acts
+        largest = [*acted.max(axis=0).tolist(), *known.impacts.max(axis=0).tolist()]
     else:
         found["largest_of"], largest = MOTION, [row[name] for name in PEAKS]
     found["largest_N"] = dict(zip(FORCES, largest, strict=True))

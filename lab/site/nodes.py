@@ -26,7 +26,7 @@ def page() -> str:
     ]
     with _nodes() as nodes:
         for name, node in nodes.items():
-            rows = [(f"`{own}`", _value(node, own), node.describe_parameter(own).description)
+            rows = [(f"`{own}`", str(node.get_parameter(own).value), node.describe_parameter(own).description)
                     for own in node._parameters if "." not in own and not own.startswith(ROS)]
             parts += [f"## {name}", table(("parameter", "default", "meaning"), rows)]
         services = nodes["plant"].get_service_names_and_types_by_node("plant", "/")
@@ -34,12 +34,6 @@ def page() -> str:
     return "\n\n".join([
         *parts, "## Services of plant", "[Operate the graph](../how-to/operate-the-graph.md) says what they do.",
         table(("service", "type"), calls)])
-
-
-def _value(node: Any, name: str) -> str:
-    """The default of a parameter; that of the bag's path has the time in it."""
-    value = node.get_parameter(name).value
-    return "grasp_DATE-TIME" if str(value).startswith("grasp_") else f"{value}"
 
 
 @contextmanager

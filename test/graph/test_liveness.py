@@ -65,7 +65,7 @@ def test_who_waits_says_for_whom_and_goes_on_when_it_is_back(launch: Any, tmp_pa
         graph.wait_for(other, words)
         wait_for(lambda other=other: levels().get(f"/{other}") == DiagnosticStatus.ERROR, "an error in /diagnostics")
         graph.processes[name].send_signal(signal.SIGCONT)
-        wait_for(lambda other=other, words=words: "is back after" in graph.said(other).split("waits on")[-1], "its end")
+        wait_for(lambda other=other: "is back after" in graph.said(other).split("keeps waiting")[-1], "its end")
         wait_for(lambda other=other: levels().get(f"/{other}") == DiagnosticStatus.WARN, "a warning from then on")
         assert "this process was stopped for" in graph.said(name)
     graph.processes["right_controller"].kill()
@@ -222,14 +222,15 @@ def law(tick, t, x, v):
 """
 
 
+@pytest.mark.parametrize("how", [(), ("--free-running",)])
 def test_a_law_that_goes_away_is_followed_and_one_that_stands_in_one_process_has_as_long_as_in_four(
-    grasp_run: Any, tmp_path: Path
+    grasp_run: Any, tmp_path: Path, how: tuple[str, ...]
 ) -> None:
     (tmp_path / "mine.py").write_text(AWAY)
-    run = grasp_run("case_01", "--one-process", "--controller", "left=mine:law")
+    run = grasp_run("case_01", "--one-process", "--controller", "left=mine:law", *how)
     _, err = run.communicate(timeout=DEADLINE)  # the time for the first answer is longer than this
     assert run.returncode == 1
-    words = r"^grasp: left_controller: stands for \d+\.\d s: in .*mine.py, line 11; run/bag has what"
+    words = r"^grasp: left_controller: blocked for \d+\.\d s: in .*mine.py, line 11; run/bag has what"
     assert re.search(words, err, re.M), err
     assert bag.read(tmp_path / "run" / "bag").tick[-1] > 100
 
@@ -254,7 +255,7 @@ def test_who_stands_because_another_was_stopped_says_so_and_ends(launch: Any, tm
     plant.send_signal(signal.SIGSTOP)
     _, err = controller.communicate(timeout=DEADLINE)
     assert controller.returncode == 1
-    assert re.search(r"\[FATAL\] \[left_controller\]: stands for \d+\.\d s: /plant was stopped\n", err), err
+    assert re.search(r"\[FATAL\] \[left_controller\]: blocked for \d+\.\d s: /plant was stopped\n", err), err
 
 
 def test_one_that_has_just_come_is_not_silent_as_the_one_before_it(node: tuple[Any, SingleThreadedExecutor]) -> None:

@@ -15,11 +15,12 @@ from rosbags.typesys import Stores, get_typestore
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.recover import recover
+from grasp_ros.graph.bag.summary import summary
 from grasp_ros.graph.bag.verify import verify
 from grasp_ros.graph.serialization import list_message
 from grasp_ros.physics.layout import OBJECT
 from grasp_ros.physics.system import COLUMN, NAMES
-from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, LYAPUNOV, LYAPUNOV_NAMES, Topic
+from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, LYAPUNOV, LYAPUNOV_NAMES, TIMING, Topic
 from grasp_ros.simulation import simulate
 from lab.drills import recorder as study
 
@@ -64,6 +65,21 @@ def test_what_is_no_message_is_refused_wherever_it_stands(tmp_path: Path, topic:
         written(tmp_path / str(number), run.scene, ticks)
         with pytest.raises(bag.BagError, match="not a bag of this package"):
             bag.read(tmp_path / str(number))
+
+
+def test_what_strangers_send_on_timing_is_left_out(tmp_path: Path) -> None:
+    """One of them made a whole bag unreadable, or `grasp inspect` a traceback."""
+    own = {"reached": 0.5, "overruns": 3.0, "lost_s": 0.25}
+    sent = [list_message(0, names, np.array(numbers)) for names, numbers in (
+        (("a", "b"), [1.0, 2.0]), (tuple(own), [0.1, 1.0, 0.0]), (tuple(own), [*own.values()]),
+        (("a", "b"), []), (tuple(own), [math.nan, 0.0, 0.0]), (("reached",), [1.0]),
+    )]
+    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
+    ticks = list(study.ticks_of(run))
+    ticks[5][1].extend((TIMING, cdr) for cdr in (*sent, b"", sent[2][:-3]))
+    recording = bag.read(written(tmp_path / "bag", run.scene, ticks))
+    assert {name: values[-1] for name, values in recording.timing.items()} == own
+    assert summary(recording)["given_up_s"] == own["lost_s"]
 
 
 @pytest.mark.parametrize("name", ["case_01", "everything", "arm_alone"])
@@ -141,6 +157,7 @@ def test_a_tick_that_cannot_be_true_is_refused_and_left_out_of_what_is_recovered
         bag.read(tmp_path / "bag")
     found = recover(tmp_path / "bag", tmp_path / "new")
     assert [left.partition(":")[0] for left in found.left_out] == ["something of 1 ticks, the first 5"]
+    assert found.missing == "1 ticks, the first 5"
     assert bag.read(tmp_path / "new").tick.tolist() == [tick for tick in range(11) if tick != 5]
 
 

@@ -52,7 +52,7 @@ REFUSED = [
     ("plant", "--params-file nothing.yaml", "ROS does not start: "),
     ("monitor", "-p bagg:=new", "bagg: no such parameter; did you mean bag?"),
     ("left_controller", "-p wait_for_monitr:=true", "wait_for_monitr: no such parameter; did you mean wait_for_moni"),
-    ("monitor", "-p bag:=.", "bag: .: is there; allowed: a new directory"),
+    ("monitor", "-p bag:=.", "bag: .: already exists; allowed: a new directory"),
     ("monitor", "-p bag:=/dev/null/bag", "bag: /dev/null/bag: cannot be written: Not a directory"),
     ("monitor", "-p bag:=/proc/bag", "bag: /proc/bag: cannot be written: No such file or directory"),
 ]

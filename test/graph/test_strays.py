@@ -86,6 +86,17 @@ def test_what_nothing_stands_for_is_given_up_later() -> None:
     assert found.lost == 1
 
 
+def test_who_comes_late_takes_what_comes_before_the_first_state() -> None:
+    """It was of a wrong stamp, and lacked in the first ticks."""
+    ticks, late = Synchronizer([LEFT_COMMAND], ["left"], PERIOD, END), 6000
+    assert ticks.put(LEFT_COMMAND, command(late, 2.0)) is Arrival.TAKEN
+    ticks.put(JOINT_STATES, state(late))
+    found = ticks.take()
+    assert found is not None
+    assert (raw_force(found.found[LEFT_COMMAND]), found.lost) == (2.0, 0)
+    assert ticks.put(LEFT_COMMAND, command(2 * late, 2.0)) is Arrival.STAMP
+
+
 STRAY = """
 import rclpy
 from geometry_msgs.msg import WrenchStamped

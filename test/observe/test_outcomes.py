@@ -170,6 +170,13 @@ def test_the_peak_of_a_free_impact() -> None:
     assert lossy["lost_impacts"] == pytest.approx(0.25 * (1.0 - speed**2), rel=1e-12)
 
 
+def test_a_pair_that_begins_closed_without_force_has_a_penetration() -> None:
+    scene = scenes.load("case_01", ["time.duration_s=0.3", "left_arm.position_m=0.01", "left_arm.velocity_m_per_s=-1",
+                                    "left_contact.dissipation_s_per_m=5"])
+    assert outcomes_of(scene)["peak_penetration_left"] == 0.01
+    assert outcomes_of(scene, sampled=True)["peak_penetration_left"] == 0.01
+
+
 def test_an_arm_alone_settles_where_its_envelope_says() -> None:
     scene = scenes.load("arm_alone").changed({"left_feedback.set_point_m": 0.0})
     found = ensemble(scene, {}, ["settling_time", "extremes"], setup=Setup(settled=0.1)).columns

@@ -45,6 +45,21 @@ def test_outcomes_are_those_of_a_simulation_and_bounds_are_kept() -> None:
 
 
 @pytest.mark.slow
+def test_a_search_does_not_end_where_many_choices_are_alike() -> None:
+    """Of most gains nothing touches, and the object stays; half of the seeds ended there."""
+    bounds = {"touches": 2.0}
+    found = [gr.design(gr.load("case_01", ["time.duration_s=3"]), {BOTH_KV: (0.5, 30.0)}, "x_object_end", bounds,
+                       seed=seed).outcomes["x_object_end"] for seed in range(3)]
+    assert max(found) == pytest.approx(-0.00097076, rel=1e-4)
+
+
+def test_a_body_that_is_not_there_has_no_part_in_a_group() -> None:
+    scene = gr.load("arm_alone").changed({"left_feedback.set_point_m": 0.0})
+    gain = {"left_feedback.velocity_gain_Ns_per_m": (0.5, 20.0)}
+    alone, group = (gr.design(scene, gain, name) for name in ("settling_time", "settling_times"))
+    assert group.outcomes["settling_times"] == pytest.approx(alone.outcomes["settling_time"], rel=1e-9)
+
+
 def test_no_choice_along_two_outcomes_is_better_in_both(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("grasp_ros.optimization.search.FRONT", 4)
     scene = gr.load("case_01", ["left_feedback.velocity_gain_Ns_per_m=7", "right_feedback.velocity_gain_Ns_per_m=7"])

@@ -209,7 +209,7 @@ def test_an_output_is_never_the_input_and_replaces_nothing_unasked(command: Any,
         assert command(*line).returncode == 0
         again = command(*line)
         assert again.returncode == 2
-        assert "is there; allowed: a new file, or --force to replace it" in again.stderr
+        assert "already exists; allowed: a new file, or --force to replace it" in again.stderr
         assert command(*line, "--force").returncode == 0
     assert {path.suffix for path in tmp_path.iterdir()} == {".yaml", ".npz", ".png", ".svg"}  # and nothing half done
 

@@ -14,6 +14,7 @@ from grasp_ros import scene
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, Transition
 from grasp_ros.simulation import Trajectory, ensemble, load, simulate
+from grasp_ros.simulation.summary import summary
 
 TIMES = np.array([1.7, 0.0, 0.43070539, 2.0, 0.43070539, 1.23456789])
 RUNS = {
@@ -102,6 +103,14 @@ def test_a_run_that_stopped_is_dense_up_to_where_it_came() -> None:
 def refused(run: Trajectory, sentence: str) -> None:
     with pytest.raises(Refused, match=sentence):
         run.at(1.0)
+
+
+@pytest.mark.parametrize("method", ["rk45", "rk45_events", "lsoda_events", "radau_events", "dop853"])
+def test_a_solver_of_scipy_gives_each_output_for_itself(method: str) -> None:
+    """Contacts and losses of its runs were refused, because its last bits went with the number of outputs."""
+    run = simulate(scene.load("case_01", ["time.duration_s=4"]), method=method, setting=1e-9)
+    assert run.at(np.linspace(0.0, 4.0, 1001)).shape == (1001, 6)
+    assert "lost_J" in summary(run)
 
 
 def test_what_cannot_be_repeated_is_refused() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, RIGHT, Transition
+from grasp_ros.physics.layout import LEFT, RIGHT, Of, Transition
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.chunk import Setup
@@ -36,6 +36,26 @@ def test_what_is_lost_adds_up_to_what_V_c_has_fallen(name: str) -> None:
     stored, lost = 0.5 * run.energy.V_c, losses(run)
     assert float(lost.total) == pytest.approx(stored[0] - stored[-1], rel=1e-12, abs=1e-12 * stored[0])
     assert (float(lost.friction) > 0.0) == (name == "friction")
+
+
+@pytest.mark.parametrize("gains", [
+    {"damping_Ns_per_m": 0.2, "velocity_gain_Ns_per_m": -0.2},
+    {"damping_Ns_per_m": 0.2, "velocity_gain_Ns_per_m": -0.19999999999999996},
+    {"damping_Ns_per_m": 1.0, "velocity_gain_Ns_per_m": -1.0 + 1e-13},
+    {"damping_Ns_per_m": 1.0, "velocity_gain_Ns_per_m": -0.9999999999, "stiffness_N_per_m": 1e4},
+    {"damping_Ns_per_m": 0.2, "velocity_gain_Ns_per_m": -0.2, "stiffness_N_per_m": 0.30000000000000004,
+     "position_gain_N_per_m": -0.3, "feed_forward_N": 1.0},
+    {"damping_Ns_per_m": 0.2, "velocity_gain_Ns_per_m": -0.199, "stiffness_N_per_m": 20.0},
+])
+def test_losses_of_a_feedback_that_gives_what_the_dampers_take(gains: dict[str, float]) -> None:
+    """The energy that both take together is next to nothing, and says nothing of either."""
+    keys = {f"left_{'arm' if key.startswith(('damping', 'stiff')) else 'feedback'}.{key}": number
+            for key, number in gains.items()}
+    scene = scenes.load("case_01", ["time.duration_s=2", *(f"{key}={number!r}" for key, number in keys.items())])
+    run = simulate(scene, grid=np.linspace(0.0, 2.0, 400_001))
+    squares = np.trapezoid(run.state[:, [COLUMN[LEFT] + 1, COLUMN[RIGHT] + 1]] ** 2, run.t, axis=0)
+    damping = run.scene.system.bodies[[LEFT, RIGHT], Of.DAMPING]
+    assert float(losses(run).dampers) == pytest.approx(float(squares @ damping), rel=1e-8)
 
 
 @pytest.mark.parametrize("p", [1e2, 1e4, 1e6, 1e7])
@@ -121,6 +141,16 @@ def test_a_summary_has_all_that_V_c_falls_by(
     assert fallen == pytest.approx(0.5 * (begin - end), abs=tight)
     assert [*found["lost_J"].values()] == pytest.approx([*map(float, losses(run))], abs=1e-12)
     assert ("work_external_J" in found) == bool(run.scene.system.external)
+
+
+def test_the_largest_force_of_an_arm_has_the_external_one_in_it_however_a_run_is_made() -> None:
+    scene = scenes.load("case_01", [*PUSHED, "time.duration_s=2"])
+    law = scene.system.laws[LEFT]
+    runs = (simulate(scene, sampled=True),
+            simulate(scene, controllers={"left": lambda tick, t, x, v: law.command(tick, x, v)}))
+    largest = [summary(run)["largest_N"]["f_l"] for run in runs]
+    assert largest[0] > 3.0
+    assert largest[1] == pytest.approx(largest[0], rel=1e-3)  # at ticks, and between them
 
 
 @pytest.mark.parametrize("name", ["case_01", "case_03", "case_05", "case_07", "noise", "saturation", "everything"])

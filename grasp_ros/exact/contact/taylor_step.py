@@ -15,7 +15,7 @@ from grasp_ros.exact.kinematics import own_size
 from grasp_ros.exact.numerics.polynomial import INVERSE, curvatures, values
 from grasp_ros.exact.numerics.powers_of_two import near_exp2, near_inverse, near_log2, orders_to_one, power_of_two
 from grasp_ros.exact.records import Array, Integers, Lanes, Order, Plant, Settings, State, Step, Tables
-from grasp_ros.exact.tolerances import STILL
+from grasp_ros.exact.tolerances import DEFECT, STILL
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Lane, Pair, U, V, Work, X, Z
 
 TAIL = 5  # at a touch with p = 0 only every fifth coefficient differs from zero
@@ -173,7 +173,7 @@ def is_exact(tables: Tables, step: Step, h: float, tolerance: float) -> bool:
     c, at, size = tables.c, tables.at, tables.size
     scale = scale_of(step.unit) if step.left and step.right else 1.0
     expected = (at[Z.L] if step.left else at[Z.R]) * (scale * (at[Z.R] if step.right else at[Z.L]))
-    allowed = 100.0 * (tolerance + EPS) * (abs(c[Lane.CHECK]) + h * abs(c[LANES + Lane.CHECK]) + size[Lane.CHECK])
+    allowed = DEFECT * (tolerance + EPS) * (abs(c[Lane.CHECK]) + h * abs(c[LANES + Lane.CHECK]) + size[Lane.CHECK])
     return abs(at[Lane.CHECK] - expected) <= allowed
 
 

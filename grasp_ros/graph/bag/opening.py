@@ -13,7 +13,7 @@ from rosbags.serde import SerdeError
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
 from grasp_ros.graph.bag.recorder import OWN_RECORD, VERSION
-from grasp_ros.graph.bag.rosbag2 import TOPIC, BagError, decode, names_of, topics_of
+from grasp_ros.graph.bag.rosbag2 import TOPIC, BagError, EmptyBagError, decode, names_of, topics_of
 from grasp_ros.graph.bag.storage import CONVERT, Storage, Stored
 from grasp_ros.physics import given
 from grasp_ros.scene.files import DAMAGE, decoding
@@ -66,7 +66,7 @@ class Opened:
                     raise BagError(f"{path}: its messages are compressed one by one; allowed: chunks, {CONVERT}")
                 records[OWN_RECORD] = _said(first, path)
             if OWN_RECORD not in records:
-                raise BagError(f"{path}: holds no tick")
+                raise EmptyBagError(f"{path}: holds no tick")
             own = records[OWN_RECORD]
             self.scene = scenes.parse(own["scene"], path.name, str(path))
             self.running = runnings.parse(own["run"])

@@ -9,7 +9,8 @@ import math
 import os
 from array import array
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -18,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.graph.bag.opening import Opened, decoding_bag
+from grasp_ros.graph.bag.opening import UNREADABLE, Opened, decoding_bag
 from grasp_ros.graph.bag.recorder import BESIDE, LOST_RECORD, Recorder, checksum
 from grasp_ros.graph.bag.recording import Recording, acted_from
-from grasp_ros.graph.bag.rosbag2 import BagError, decode
+from grasp_ros.graph.bag.rosbag2 import BagError, EmptyBagError, decode
 from grasp_ros.graph.bag.storage import Storage, Stored
 from grasp_ros.graph.serialization import clock_template, force_template, lyapunov_template, state_template
 from grasp_ros.physics.layout import OBJECT
@@ -52,7 +53,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
         takers: dict[Topic, Callable[[Stored], object]] = {
             **{topic: column.add for topic, column in columns.items()},
             **{topic: partial(changes.add, topic, scene) for topic in CHANGES.values()},
-            TIMING: lambda stored: timing.append(decode(TIMING, stored.cdr)),
+            TIMING: lambda stored: timing.extend(_of_a_plant(stored)),
         }
         counts = dict.fromkeys(opened.names, 0)
         for topic, stored in opened.messages:
@@ -60,7 +61,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
             if topic in takers:
                 takers[topic](stored)
         if not columns[JOINT_STATES].times:
-            raise BagError(f"{opened.path}: holds no tick")
+            raise EmptyBagError(f"{opened.path}: holds no tick")
         _check_metadata(opened.path, opened.storage)
         return _recording(opened, columns, changes, {topic.name: count for topic, count in counts.items()}, timing)
 
@@ -227,6 +228,15 @@ class Changes(dict[int, dict[str, float]]):
         if new := {name: number for name, number in numbers.items() if now[name] != number}:
             self.setdefault(tick, {}).update(new)
             self._now.update(new)
+
+
+def _of_a_plant(stored: Stored) -> Iterator[Any]:
+    """A message on `timing`, unless somebody else has sent it: anybody may."""
+    with suppress(*UNREADABLE):
+        message = decode(TIMING, stored.cdr)
+        whole = len(message.name) == len(message.position) and np.isfinite(message.position).all()
+        if whole and {"reached", "overruns", "lost_s"} <= {*message.name}:  # see `free_running.Timing`
+            yield message
 
 
 def _table(messages: Sequence[Any]) -> dict[str, Array]:

@@ -173,7 +173,7 @@ class Recorder:
             why = "files may not be larger" if self._sink.full in (0, errno.EFBIG) else "no space is left on the disk"
             until = f"the recording ends at {self._last_ns / NANOSECONDS} s"
             self._error = (f"{self._path}: {until}: {why}; the bag is closed, and whole up to there" if self._next else
-                           f"{self._path}: not a tick could be recorded: {why}")
+                           f"{self._path}: no tick could be recorded: {why}")
             self._finish(why, {})
 
     def _flush_regularly(self) -> None:

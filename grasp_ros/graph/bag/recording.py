@@ -23,7 +23,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.effects.force import SECTIONS
-from grasp_ros.scene.topics import CONTACTS, EXTERNAL_FORCES, LYAPUNOV_NAMES
+from grasp_ros.scene.topics import CLOCK, CONTACTS, EXTERNAL_FORCES, LYAPUNOV_NAMES
 from grasp_ros.simulation import Trajectory, simulate
 from grasp_ros.simulation.tables import Tabular
 
@@ -244,7 +244,7 @@ class Recording(Tabular, Frozen):
         """
         ticks = int(self.tick.max(initial=-1)) + 1
         held = () if self.running.lockstep else self.scene.controllers.values()
-        every_tick = [topic.name for topic in self.scene.topics if topic not in held]
+        every_tick = [topic.name for topic in (CLOCK, *self.scene.topics) if topic not in held]
         left_out = {NOT_RECORDED: number} if (number := int(self.lost.get(NOT_RECORDED, 0))) else {}
         return {**{name: ticks - self.counts[name] for name in every_tick}, **self.unheard, **left_out}
 

@@ -25,6 +25,10 @@ class BagError(Refused):
     """A bag that cannot be written or read: names the path and the reason."""
 
 
+class EmptyBagError(BagError):
+    """A bag without a tick."""
+
+
 def topics_of(scene: Scene) -> list[Topic]:
     """Topics of a bag, in the order of their connections."""
     return [SCENE, RUN, CLOCK, *scene.topics, *CHANGES.values(), TIMING, DIAGNOSTICS]

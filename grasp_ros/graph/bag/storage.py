@@ -75,8 +75,8 @@ class Storage:
         data = self._data
         if data[: len(MAGIC)] != MAGIC:
             raise BagError(f"{self.path}: not a bag of this package: no MCAP file")
-        if self.closed and not self._salvage:
-            self._check_sums()
+        if self.closed:
+            (self._read_summary if self._salvage else self._check_sums)()
         offset = len(MAGIC)
         while offset < len(data):
             end = self._end_of(offset)
@@ -144,16 +144,35 @@ class Storage:
                 raise McapError("a record does not fit into its chunk")
             if opcode == Opcode.MESSAGE:
                 found.append(self._stored(body))
-            elif opcode == Opcode.SCHEMA:
-                schema = Schema.read(ReadDataStream(BytesIO(body)))
-                self._schemas[schema.id] = schema
-            elif opcode == Opcode.CHANNEL:
-                channel = Channel.read(ReadDataStream(BytesIO(body)))
-                self._channels[channel.id] = channel
-            else:
+            elif not self._defines(opcode, body):
                 raise McapError(f"record {opcode} is not one of a chunk")
             offset += HEAD.size + length
         yield from found
+
+    def _defines(self, opcode: int, body: bytes) -> bool:
+        """Take a schema or a channel; whether it is one."""
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(ReadDataStream(BytesIO(body)))
+            self._schemas[schema.id] = schema
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(ReadDataStream(BytesIO(body)))
+            self._channels[channel.id] = channel
+        return opcode in (Opcode.SCHEMA, Opcode.CHANNEL)
+
+    def _read_summary(self) -> None:
+        """Take schemas and channels from the index, which repeats them: their chunk, the first, may be damaged."""
+        with suppress(*DAMAGE):
+            footer = self._footer()
+            offset, summary = footer.summary_start, self._data[footer.summary_start : -len(MAGIC) - SUM.size]
+            if zlib.crc32(summary) != footer.summary_crc:
+                return
+            while offset and (end := self._end_of(offset)) is not None:
+                self._defines(self._data[offset], self._data[offset + HEAD.size : end])
+                offset = end
+
+    def _footer(self) -> Footer:
+        footer: Footer = Footer.read(ReadDataStream(BytesIO(self._data[HEAD.size - FOOTER_BYTES : -len(MAGIC)])))
+        return footer
 
     def _stored(self, body: bytes) -> Stored:
         number, time_ns = MESSAGE.unpack_from(body)
@@ -187,7 +206,7 @@ class Storage:
     def _check_sums(self) -> None:
         """Refuse a closed file of which a byte is wrong."""
         data = memoryview(self._data)
-        footer = Footer.read(ReadDataStream(BytesIO(data[HEAD.size - FOOTER_BYTES : -len(MAGIC)])))
+        footer = self._footer()
         end = footer.summary_start or len(data) - FOOTER_BYTES  # without an index
         if not DATA_END_BYTES <= end <= len(data):
             self._refuse("its end does not say where its index is")

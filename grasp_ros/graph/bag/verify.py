@@ -21,7 +21,7 @@ from grasp_ros.physics.model import Array, Contact, impact_force, penetration
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.effects.force import SECTIONS
-from grasp_ros.scene.topics import CHANGES, CONTACTS, EXTERNAL_FORCES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES
+from grasp_ros.scene.topics import CHANGES, CLOCK, CONTACTS, EXTERNAL_FORCES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.sampled_plant import SampledPlant
 
@@ -104,6 +104,8 @@ class Answers(NamedTuple):
     def __str__(self) -> str:
         if self.own is None:
             return "not compared: in a free run a command acts when it comes"
+        if not self.commands:
+            return f"not known: the bag has no message on {self.topic}"
         if not self.differs:
             return "the scene's law"
         if self.lost:
@@ -156,6 +158,8 @@ def _gap(recording: Recording, lost: Mapping[str, np.ndarray]) -> str:
         return f"tick {recording.tick[missing[0]] + 1} is missing: what acted then is not known"
     words = [f"{name} of {np.count_nonzero(rows)} ticks, the first {recording.tick[np.argmax(rows)]}"
              for name, rows in lost.items() if rows.any()]
+    if (without := recording.missing[CLOCK.name]) > 0:
+        words.append(f"{CLOCK.name} of {without} ticks")
     return f"the bag lacks {' and '.join(words)}" if words else ""
 
 

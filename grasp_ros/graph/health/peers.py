@@ -1,4 +1,4 @@
-"""A node that needs others: it notices when one of them is gone or silent, says which, and ends or waits on."""
+"""A node that needs others: it notices when one of them is gone or silent, says which, and ends or keeps waiting."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from grasp_ros.graph.health.heartbeat import ENDED, Heartbeats, digest
 from grasp_ros.graph.health.watchdog import Watchdog
-from grasp_ros.graph.parameters import PEER_SECONDS, START_SECONDS, check_timeouts
+from grasp_ros.graph.parameters import check_timeouts
 from grasp_ros.graph.ros.node import PATIENCE_SECONDS, GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import TEXT_BYTES
@@ -29,7 +29,7 @@ class Gone(Enum):
     """What a node does when nobody publishes a topic any more."""
 
     ENDS = "ends"
-    AS_TOLD = "ends or waits on, as on_silence says"
+    AS_TOLD = "ends or keeps waiting, as on_silence says"
     STAYS = "waits for the next one"
 
 
@@ -55,9 +55,9 @@ class PeerNode(GraspNode):
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
-        self.patience = self.read_only("peer_timeout_s", PEER_SECONDS)
-        self.start_patience = self.read_only("start_timeout_s", START_SECONDS) or math.inf
-        reaction = self.read_only("on_silence", "wait")
+        self.patience = self.read_only("peer_timeout_s")
+        self.start_patience = self.read_only("start_timeout_s") or math.inf
+        reaction = self.read_only("on_silence")
         check_timeouts(self.patience, self.start_patience)
         if reaction not in ("end", "wait"):
             raise Refused(f"on_silence: {reaction!r} is not allowed; allowed: end, wait")
@@ -190,7 +190,7 @@ class PeerNode(GraspNode):
                 self._silent[name] = now
                 self.count("silent peers")
             self._said = now
-            self.get_logger().error(f"{trouble.words}; waits on")
+            self.get_logger().error(f"{trouble.words}; keeps waiting")
         self.trouble = f"waits for {', '.join(self._silent)}" if self._silent else ""
 
     def living(self, topic: Topic) -> list[str]:

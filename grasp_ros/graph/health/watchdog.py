@@ -66,9 +66,9 @@ class Watchdog:
         if self._beaten - self._said > EVERY_SECONDS:
             self._said = self._beaten
             with suppress(OSError):
-                print(f"[FATAL] [{name}]: stands for {seconds:.1f} s: {why}", file=sys.stderr, flush=True)
+                print(f"[FATAL] [{name}]: blocked for {seconds:.1f} s: {why}", file=sys.stderr, flush=True)
         if self._ends:
-            tell_parent(name, f"stands for {seconds:.1f} s: {why}")
+            tell_parent(name, f"blocked for {seconds:.1f} s: {why}")
             os._exit(1)
 
 

@@ -53,10 +53,9 @@ class Held:
 class FreeRunning:
     """Advances the plant with the wall clock; if it `waits`, from when somebody sends the commands of each side."""
 
-    answered = False  # never: it waits for no controller
-
     def __init__(self, plant: Plant, steering: Steering, running: Running, waits: bool) -> None:
         self._plant, self._steering, self._running, self._awaits = plant, steering, running, waits
+        self.answered = False  # whether a state of this run was
         self.topics: list[Topic] = []  # of which it needs each message
         self._period = plant.scene.period_ns / NANOSECONDS / running.real_time_factor  # s of wall time
         self._timeouts = {
@@ -103,7 +102,7 @@ class FreeRunning:
         elif tick < held.answers:
             plant.count("stale commands")
         elif self._limits.admit(topic, cdr):
-            held.force, held.answers = force, tick
+            held.force, held.answers, self.answered = force, tick, True
             self.advance()
 
     def advance(self) -> None:
@@ -174,7 +173,7 @@ class FreeRunning:
 
     def report(self) -> None:
         """Publish the quality of the last second; say whose commands are missing."""
-        late = [f"no young command of {side}" for side, held in self._held.items() if held.late]
+        late = [f"no recent command of {side}" for side, held in self._held.items() if held.late]
         self._plant.concern = "; ".join(late)
         if values := self._timing.take():
             self._quality.publish(numbers_message(self._plant.tick * self._plant.scene.period_ns, values))

@@ -28,7 +28,7 @@ class Steering:
 
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
-        self._paused = plant.read_only("paused", False)
+        self._paused = plant.read_only("paused")
         self.steps = 0  # control periods that are still to be done although the plant is paused
         self.reset_due = False  # whether it is to be put back once its current state has been answered
         plant.declare("steps", 1, ParameterDescriptor(

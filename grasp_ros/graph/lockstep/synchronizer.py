@@ -16,7 +16,7 @@ from grasp_ros.scene.topics import COMMANDS, FORCE, JOINT_STATES, WINDOW, Topic
 
 PATIENCE_TICKS = WINDOW + 100  # later states after which a message is given up; who waits is never so far ahead
 UNCERTAIN_SECONDS = 1.0  # without a new tick, after which a command is made from what a later state says
-GIVE_UP_SECONDS = 4.0  # the same for a message that nothing stands for; DDS repeats what it lost after 3 s at most
+GIVE_UP_SECONDS = 4.0  # the same for a message with no such state; DDS repeats what it lost after 3 s at most
 MOST_UNCERTAIN = 8  # different commands for one state
 ARMS = {topic: SIDES[side] for side, topic in COMMANDS.items()}
 
@@ -100,7 +100,7 @@ class Synchronizer:
         return Arrival.TAKEN
 
     def _put_other(self, topic: Topic, stamp: int, cdr: bytes, sure: bool) -> Arrival:
-        if stamp > max(self._newest, 0) + self._ahead_ns:
+        if 0 <= self._newest < stamp - self._ahead_ns:  # of who comes late, the first message may have any
             return Arrival.STAMP
         if topic.type == FORCE and not math.isfinite(raw_force(cdr)):
             return Arrival.REFUSED

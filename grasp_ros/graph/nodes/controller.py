@@ -47,8 +47,8 @@ class Controller(PeerNode):
         super().__init__(name, **options)
         self._executable = name  # the node may have been given another name
         self._side = name.removesuffix("_controller")
-        self._monitored = self.read_only("wait_for_monitor", False)
-        law = self.read_only("law", "")
+        self._monitored = self.read_only("wait_for_monitor")
+        law = self.read_only("law")
         self._own = OwnLaw(law) if law else None
         self._commands, self._force_template = self.publisher(COMMANDS[self._side]), force_template()
         self._announcements = self.publisher(CHANGES[self._side])
@@ -157,7 +157,7 @@ class Controller(PeerNode):
             self._announcements.publish(numbers_message(time_ns, numbers, self._number))
             # What a reader has received before it receives the command, it also sees before.
             if not self._announcements.wait_for_all_acked(Duration(seconds=ANNOUNCE_SECONDS)):
-                self.get_logger().warning(f"{CHANGES[self._side].name}: a listener does not confirm what it was told")
+                self.get_logger().warning(f"{CHANGES[self._side].name}: a subscriber did not acknowledge a change")
 
     def _admits(self, time_ns: int) -> bool:
         """Whether a state can be one of this run."""

@@ -67,8 +67,7 @@ class Monitor(PeerNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("monitor", **options)
-        default = f"grasp_{datetime.now():%Y_%m_%d-%H_%M_%S}"
-        self._path = Path(self.read_only("bag", default))
+        self._path = Path(self.read_only("bag") or f"grasp_{datetime.now():%Y_%m_%d-%H_%M_%S}")
         with writing(f"bag: {self._path}"):  # now, and not when a plant comes
             with suppress(FileNotFoundError):  # what else is wrong with the path is told
                 self._path.lstat()
@@ -144,7 +143,7 @@ class Monitor(PeerNode):
         if self._scene is None or self._running is None:
             return
         scene, running = self._scene, self._running
-        beside = [TIMING] if running.lockstep else [TIMING, *scene.controllers.values()]
+        beside = [] if running.lockstep else [TIMING, *scene.controllers.values()]
         per_tick = [topic for topic in scene.topics if topic != LYAPUNOV and topic not in beside]
         self._lyapunov, self._picture = LyapunovMonitor(scene), Picture(self, scene)
         self._synchronizer = Synchronizer(

@@ -25,7 +25,6 @@ from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.running import Running, check_factor
 from grasp_ros.graph.serialization import SHORTEST, clock_template, force_template, raw_stamp_ns, state_template
-from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW
@@ -41,12 +40,12 @@ class Plant(PeerNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("plant", **options)
-        name = self.read_only("scene", "case_01")
-        self._accuracy = self.read_only("accuracy", ACCURACY)
-        self.monitored = self.read_only("wait_for_monitor", False)
-        progress = self.read_only("progress", False)
-        free = self.read_only("free_running", False)
-        waits = free and self.read_only("wait_for_controllers", False)
+        name = self.read_only("scene")
+        self._accuracy = self.read_only("accuracy")
+        self.monitored = self.read_only("wait_for_monitor")
+        progress = self.read_only("progress")
+        free = self.read_only("free_running")
+        waits = free and self.read_only("wait_for_controllers")
         steering = Steering(self)
         scene = scenes.load(name)
         running = self._read_running(free, list(scene.controllers.values()))
@@ -82,13 +81,13 @@ class Plant(PeerNode):
         """How it runs, from its parameters; those of the free-running loop exist only there."""
         if not free:
             return Running(self._accuracy)
-        factor = self.read_only("real_time_factor", 1.0)
+        factor = self.read_only("real_time_factor")
         check_factor(factor)
         timeouts, reactions = {}, {}
         for topic in topics:
             side = topic.name.split("/")[0]
-            timeouts[side] = self.read_only(f"{side}_timeout_s", 0.1)
-            reactions[side] = self.read_only(f"{side}_on_timeout", "zero")
+            timeouts[side] = self.read_only(f"{side}_timeout_s")
+            reactions[side] = self.read_only(f"{side}_on_timeout")
         return Running(self._accuracy, factor, timeouts, reactions)
 
     def _new_plant(self) -> SampledPlant:

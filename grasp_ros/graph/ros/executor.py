@@ -69,9 +69,9 @@ def _live(
             for node in nodes:
                 node.guarded(node.close)
     except Refused as error:
-        tell_parent(names, str(error), 2)
-        with suppress(OSError):  # nobody reads it
-            print(error, file=sys.stderr)
+        if not tell_parent(names, str(error), 2):  # which says it
+            with suppress(OSError):  # nobody reads it
+                print(error, file=sys.stderr)
         return 2
     except Exception as error:  # in one line, and where
         whose = next((text for kind, text in NOT_OURS.items() if isinstance(error, kind)), "a fault of this package")

@@ -32,15 +32,16 @@ class ParameterNode(Node):
     why_read_only = "set at the start only, with -p or a parameter file"
 
     def __init__(self, name: str, **options: Any) -> None:
-        self._in_words = PARAMETERS.get(name, {})
+        self._settings = PARAMETERS.get(name, {})
         with refusing():
             super().__init__(name, **options)
         if FILE in sys.argv and not self._parameter_overrides:  # the file may be for others, or the name is wrong
             self.get_logger().info(f"no parameter file has anything for {self.get_fully_qualified_name()}")
 
-    def read_only(self, name: str, default: Any) -> Any:
-        """Declare a parameter that is set at start only, and return its value."""
-        descriptor = ParameterDescriptor(description=self._in_words[name], read_only=True, dynamic_typing=True)
+    def read_only(self, name: str) -> Any:
+        """Declare one of PARAMETERS, which is set at start only, and return its value."""
+        default, text = self._settings[name]
+        descriptor = ParameterDescriptor(description=text, read_only=True, dynamic_typing=True)
         value, kind = self.declare(name, default, descriptor), type(default)
         if kind is float and type(value) is int:
             return float(value)

@@ -24,8 +24,8 @@ class Player(GraspNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("player", **options)
-        bag = Opened(self.read_only("bag", ""))
-        self._rate = self.read_only("rate", 1.0)
+        bag = Opened(self.read_only("bag"))
+        self._rate = self.read_only("rate")
         if not 0.0 < self._rate < math.inf:
             raise Refused(f"rate: {self._rate!r} is not allowed; allowed: a number > 0")
         self._rows = bag.messages

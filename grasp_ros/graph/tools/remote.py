@@ -45,7 +45,7 @@ class Remote(GraspNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("remote", **options)
-        self._wanted: list[str] = json.loads(self.read_only("words", "[]"))
+        self._wanted: list[str] = json.loads(self.read_only("words"))
         self._known: dict[str, Any] = {}
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self)
