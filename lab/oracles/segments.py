@@ -91,9 +91,12 @@ def rule() -> Rule:
 
 
 def pieces_of(run: Trajectory) -> Pieces:
-    """Cut a run at its events and where its inputs change, and each segment into pieces, short ones at its ends."""
-    scene = run.scene
-    edges = np.unique(np.concatenate([[0.0, scene.duration], run.event_table[:, 0], _changes(scene)]))
+    """Cut a run at its events, where its inputs change and where it comes to rest.
+
+    Each of these segments is cut into pieces, short ones at its ends.
+    """
+    scene, rest = run.scene, [] if run.at_rest is None else [run.at_rest]
+    edges = np.unique(np.concatenate([[0.0, scene.duration], run.event_table[:, 0], _changes(scene), rest]))
     edges = edges[(edges >= 0.0) & (edges <= scene.duration)]
     spans = [(a, b) for a, b in pairwise(edges.tolist()) if b - a > SHORTEST * b]
     if len(spans) > MOST_SEGMENTS:
