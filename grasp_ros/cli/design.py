@@ -40,13 +40,13 @@ def add_to(commands: Any) -> None:
 
 def _design(options: argparse.Namespace) -> int:
     from grasp_ros.maps.plan import read_axis
-    from grasp_ros.optimization.problem import Problem, read_bound
+    from grasp_ros.optimization.problem import DesignProblem, read_bound
     from grasp_ros.optimization.search import Design, front, search
     from grasp_ros.simulation.chunk import Setup
 
     scene = load_scene(options.scene, options.settings)
     setup = Setup(accuracy=options.accuracy, sampled=options.sampled)
-    problem = Problem(scene, [read_axis("--free", text, grid=False) for text in options.free], options.minimise,
+    problem = DesignProblem(scene, [read_axis("--free", text, grid=False) for text in options.free], options.minimise,
                       [read_bound(text) for text in options.bounds], setup)
     check_output(options.output, YAML, options.force, [options.scene])
     check_output(options.figure, figure_endings(options.figure), options.force, [options.scene])

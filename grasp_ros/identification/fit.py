@@ -10,7 +10,7 @@ import numpy as np
 from grasp_ros.identification.measured import FEWEST, Source, measured
 from grasp_ros.identification.numbers import acts, numbers_of
 from grasp_ros.identification.result import Against, Fit, identifiability_of, residual_table
-from grasp_ros.identification.search import Problem, first_noise, fitted, mean_square, refine, search
+from grasp_ros.identification.search import FitProblem, first_noise, fitted, mean_square, refine, search
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import mapping, names, number, truth
 from grasp_ros.physics.model import Array
@@ -66,10 +66,10 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
     if samples < len(numbers) + FEWEST:
         raise Refused(f"{found.name}: {samples} measured numbers; allowed for {len(numbers)} free ones: at least"
                       f" {len(numbers) + FEWEST}")
-    return _result(fitted(Problem(found, found.scene, numbers, first_noise(found))), against)
+    return _result(fitted(FitProblem(found, found.scene, numbers, first_noise(found))), against)
 
 
-def _result(problem: Problem, against: Mapping[str, float]) -> Fit:
+def _result(problem: FitProblem, against: Mapping[str, float]) -> Fit:
     """What the minimum, at y = 0, says."""
     data, rows, y = problem.data, len(problem.data.t), np.zeros(len(problem.numbers))
     values, slopes = problem.residuals(y, rows)
@@ -89,7 +89,7 @@ def _result(problem: Problem, against: Mapping[str, float]) -> Fit:
     )
 
 
-def _test(problem: Problem, key: str, value: float, best: Array) -> Against:
+def _test(problem: FitProblem, key: str, value: float, best: Array) -> Against:
     """F test of a value of one number: by how much the sum of squares grows where it is fixed."""
     from scipy import stats
 

@@ -39,7 +39,7 @@ MOST = 30  # motions of one horizon
 FLOOR = 1e-9  # of the spread of a channel, or of others of its kind where it stands still: the least noise
 
 
-class Problem(NamedTuple):
+class FitProblem(NamedTuple):
     """What is searched: numbers of a scene that let its motion be the measured one."""
 
     data: Measured
@@ -51,7 +51,7 @@ class Problem(NamedTuple):
         """The free numbers by key."""
         return {number.key: float(number.at(own)) for number, own in zip(self.numbers, y.tolist(), strict=True)}
 
-    def linear_from(self, y: Array) -> Problem:
+    def linear_from(self, y: Array) -> FitProblem:
         """The problem that begins at y, see `Number.linear_from`."""
         values = self.values(y).values()
         return self._replace(numbers=tuple(map(Number.linear_from, self.numbers, values)))
@@ -86,7 +86,7 @@ class Problem(NamedTuple):
         return scaled.ravel(), (rates[:, seen] / self.noise[seen, None]).reshape(scaled.size, -1)
 
 
-def search(problem: Problem) -> Array:
+def search(problem: FitProblem) -> Array:
     """The free numbers (n,) as y, from their starts; a scene that cannot be run as it is is refused."""
     begin = np.zeros(len(problem.numbers))
     problem.residuals(begin, FEWEST)  # a start that is refused says why
@@ -110,7 +110,7 @@ def _horizons(rows: int, growth: float) -> list[int]:
     return [max(round(rows * growth**-step), min(FEWEST, rows)) for step in range(steps, -1, -1)]
 
 
-def mean_square(problem: Problem, y: Array) -> float:
+def mean_square(problem: FitProblem, y: Array) -> float:
     """Mean square of the residuals in variances of the noise; infinite if the motion does not get to its end."""
     try:
         return float(np.mean(problem.residuals(y, len(problem.data.t))[0] ** 2))
@@ -118,7 +118,7 @@ def mean_square(problem: Problem, y: Array) -> float:
         return math.inf
 
 
-def refine(problem: Problem, begin: Array, rows: int, enough: float = FINE) -> Array:
+def refine(problem: FitProblem, begin: Array, rows: int, enough: float = FINE) -> Array:
     """The next minimum of the sum of squares over the first rows, from y = begin (n,); `begin` if no motion gets there.
 
     It ends where the sum changes by no more than `enough`, relative.
@@ -165,7 +165,7 @@ def _at_least(noise: Array, data: Measured) -> Array:
     return np.asarray(np.maximum(noise, FLOOR * np.where(spread == 0.0, others, spread)))
 
 
-def fitted(problem: Problem) -> Problem:
+def fitted(problem: FitProblem) -> FitProblem:
     """The problem with its free numbers, at y = 0, and the noise of their residuals; refused as in `search`."""
     problem = problem.linear_from(search(problem))
     rows, nothing = len(problem.data.t), np.zeros(len(problem.numbers))

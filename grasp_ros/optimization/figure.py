@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from grasp_ros.optimization.problem import Problem
+from grasp_ros.optimization.problem import DesignProblem
 from grasp_ros.optimization.search import Design
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Figure
@@ -17,7 +17,7 @@ CHOSEN = "#d55e00"
 
 
 @canvas.style()
-def around(problem: Problem, choice: Design) -> Figure:
+def around(problem: DesignProblem, choice: Design) -> Figure:
     """The first outcome along each free number, with the others as they were chosen; grey where a bound is broken."""
     count, name = len(problem.axes), problem.minimise[0]
     figure, row = canvas.subplots(1, count, figsize=(4.2 * count + 1.0, 3.6), layout="constrained", squeeze=False,
@@ -38,7 +38,7 @@ def around(problem: Problem, choice: Design) -> Figure:
 
 
 @canvas.style()
-def tradeoff(problem: Problem, choices: Sequence[Design]) -> Figure:
+def tradeoff(problem: DesignProblem, choices: Sequence[Design]) -> Figure:
     """Two outcomes of choices none of which is better in both."""
     figure, axes = canvas.subplots(figsize=(6.4, 4.8), layout="constrained")
     first, second = problem.minimise
@@ -51,6 +51,6 @@ def tradeoff(problem: Problem, choices: Sequence[Design]) -> Figure:
     return figure
 
 
-def label(problem: Problem, name: str) -> str:
+def label(problem: DesignProblem, name: str) -> str:
     """An outcome with its unit."""
     return f"{name.replace('_', ' ')}, {problem.units[name]}"

@@ -36,7 +36,7 @@ class Found(NamedTuple):
     stops: list[str]  # why choices were refused or stopped
 
 
-class Problem:
+class DesignProblem:
     """A scene, its free numbers with their ranges, outcomes to make small, and bounds; what cannot be is refused.
 
     Keys of an axis that are joined have one value; the search takes logarithmic ranges as such. `minimise` names one

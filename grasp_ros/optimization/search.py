@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.maps.plan import Axis
-from grasp_ros.optimization.problem import Bound, Problem
+from grasp_ros.optimization.problem import Bound, DesignProblem
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.given import mapping, number, whole
@@ -89,12 +89,12 @@ def design(
         axes.append(Axis(name, low, high))
     most = mapping("subject_to", {} if subject_to is None else subject_to)
     bounds = [Bound(name, number(name, value)) for name, value in most.items()]
-    problem = Problem(scene, axes, [minimise], bounds, setup)
+    problem = DesignProblem(scene, axes, [minimise], bounds, setup)
     with showing(progress, None, "run", scene.name) as told:
         return search(problem, seed, told)
 
 
-def search(problem: Problem, seed: int = 0, progress: Told | None = None) -> Design:
+def search(problem: DesignProblem, seed: int = 0, progress: Told | None = None) -> Design:
     """Find the choice whose first outcome is smallest within the bounds.
 
     Where the best choice is unique every seed ends there. `progress` is told the number of simulations so far. Refused:
@@ -134,14 +134,14 @@ def search(problem: Problem, seed: int = 0, progress: Told | None = None) -> Des
     return Design(problem.scene.changed(numbers), numbers, outcomes, runs)
 
 
-def costs(problem: Problem, parts: Array) -> Array:
+def costs(problem: DesignProblem, parts: Array) -> Array:
     """What a search makes small: the outcome; above all outcomes what breaks a bound, the less the better."""
     found = problem.found(problem.numbers(parts))
     outcome = np.minimum(found.outcomes[problem.minimise[0]], NOTHING)
     return np.where(found.excess > 0.0, np.minimum(BROKEN * (1.0 + found.excess), NOTHING), outcome)
 
 
-def front(problem: Problem, seed: int = 0, progress: Told | None = None) -> list[Design]:
+def front(problem: DesignProblem, seed: int = 0, progress: Told | None = None) -> list[Design]:
     """Choices none of which is better than another in both outcomes of a problem, from the first outcome's best on.
 
     Each has the smallest first outcome for a bound on the second one; the bounds are even between the two ends. Of
@@ -156,7 +156,7 @@ def front(problem: Problem, seed: int = 0, progress: Told | None = None) -> list
         before = sum(own.runs for own in choices)
         told = None if progress is None else lambda runs: progress(before + runs)
         names = (name, *(other for other in problem.minimise if other != name))  # one to make small, both to look at
-        choices.append(search(Problem(problem.scene, problem.axes, names, bounds, problem.setup), seed, told))
+        choices.append(search(DesignProblem(problem.scene, problem.axes, names, bounds, problem.setup), seed, told))
         return choices[-1]
 
     most, least = add(first, problem.bounds).outcomes[second], add(second, problem.bounds).outcomes[second]

@@ -7,11 +7,11 @@ from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.compilation.vectors import HALF, add_product, load_half, spread_half, store
 from grasp_ros.exact.records import Array
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Pair, V, X, Z
-from grasp_ros.sensitivity.tangents import AHEAD, WEIGHTS, Motion, Row, Table, Weight
+from grasp_ros.sensitivity.tangents import AHEAD, WEIGHTS, Row, TangentMotion, TangentTable, Weight
 
 
 @kernel
-def touches(motion: Motion, body: Body) -> bool:
+def touches(motion: TangentMotion, body: Body) -> bool:
     """Whether a body takes part in the contacts of a step; the others fly."""
     return body == OBJECT or motion.mode[body] == Pair.CONTACT
 
@@ -43,7 +43,7 @@ def put(table: Array, k: int, left: float, right: float, next_left: float, next_
 
 
 @kernel
-def pair_series(motion: Motion, table: Table, n: int) -> None:
+def pair_series(motion: TangentMotion, table: TangentTable, n: int) -> None:
     """Write the series that both pairs bring, by side; without contact they are 0.
 
     With s = w dt/ds, a polynomial in w, and h = u s: s (1 + p u') gives dF/du, h gives dF/du', h u' the damping.
@@ -73,7 +73,7 @@ def pair_series(motion: Motion, table: Table, n: int) -> None:
 
 
 @kernel
-def base_series(motion: Motion, table: Table, n: int) -> None:
+def base_series(motion: TangentMotion, table: TangentTable, n: int) -> None:
     """Write all series of the run that the tangents' equations need."""
     pair_series(motion, table, n)
     (first, second, third), rows, weights, c = table.products, table.rows, table.weights, motion.c

@@ -17,7 +17,19 @@ from grasp_ros.exact.numerics.roots import value_and_rate
 from grasp_ros.exact.records import Array
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Of, U, V, X
 from grasp_ros.sensitivity.base_series import base_series, touches
-from grasp_ros.sensitivity.tangents import BLOCK, ODD, STATES, STEP, SUMS, WEIGHTS, Motion, Rates, Row, Table, Weight
+from grasp_ros.sensitivity.tangents import (
+    BLOCK,
+    ODD,
+    STATES,
+    STEP,
+    SUMS,
+    WEIGHTS,
+    Row,
+    TangentMotion,
+    TangentRates,
+    TangentTable,
+    Weight,
+)
 
 MOST_HALVINGS = 200
 NEGLECTED = 4096.0 * EPS  # 1e-12 for a step; one digit more costs 5 %, as more steps are made in parts
@@ -32,7 +44,7 @@ def apart(side: Body, arm: Array, middle: Array) -> Array:
 
 
 @inlined
-def sum_products(table: Table, block: int, k: int, side: Body, alone: bool) -> None:
+def sum_products(table: TangentTable, block: int, k: int, side: Body, alone: bool) -> None:
     """Sum the products of series for coefficients k and k + 1 that a pair in contact brings, of four directions.
 
     They are x and v of the arm and v of the object times dt/ds, and what the changes of u and u' make of the impact.
@@ -71,7 +83,7 @@ def store_sums(sums: Array, first: int, side: Body, alone: bool, found: tuple[Ar
 
 
 @inlined
-def add_newest(table: Table, block: int, k: int, side: Body, alone: bool) -> None:
+def add_newest(table: TangentTable, block: int, k: int, side: Body, alone: bool) -> None:
     """Add the products with the coefficients k of a pair, which have just been found, to the sums of odd order k."""
     f, weights, i, arm = table.series, table.weights, BLOCK * block + STEP * k, HALF * velocity_lane(side)
     sums, first, pace = table.sums, SUMS * block + ODD, load_half(weights, 0)
@@ -87,7 +99,7 @@ def add_newest(table: Table, block: int, k: int, side: Body, alone: bool) -> Non
 
 
 @inlined
-def impact(rates: Rates, table: Table, block: int, k: int, side: Body) -> Array:
+def impact(rates: TangentRates, table: TangentTable, block: int, k: int, side: Body) -> Array:
     """Coefficient k of the change of the impact force of a pair, times dt/ds."""
     law, first, rows = rates.law[side], HALF * block, table.rows
     total = load_half(table.sums, SUMS * block + ODD * (k % 2) + HALF * (U.L + side))
@@ -96,7 +108,9 @@ def impact(rates: Rates, table: Table, block: int, k: int, side: Body) -> Array:
 
 
 @inlined
-def advance_body(motion: Motion, acting: Array, table: Table, at: tuple[int, int], body: Body, push: Array) -> None:
+def advance_body(
+    motion: TangentMotion, acting: Array, table: TangentTable, at: tuple[int, int], body: Body, push: Array
+) -> None:
     """Write coefficient k + 1 of a body under coefficient k of the change of the impacts on it."""
     (block, k), rows, row, rates, v = at, table.rows, motion.bodies[body], acting[body], velocity_lane(body)
     share, inverse, first = INVERSE[k + 1], 1.0 / row[Of.MASS], HALF * block
@@ -113,7 +127,7 @@ def advance_body(motion: Motion, acting: Array, table: Table, at: tuple[int, int
 
 
 @kernel
-def expand_tangents(motion: Motion, rates: Rates, table: Table, n: int) -> None:
+def expand_tangents(motion: TangentMotion, rates: TangentRates, table: TangentTable, n: int) -> None:
     """Write the series of the tangents over a Taylor step of even degree n."""
     base_series(motion, table, n)
     left, right, nothing = touches(motion, LEFT), touches(motion, RIGHT), spread_half(0.0)
@@ -139,7 +153,7 @@ def expand_tangents(motion: Motion, rates: Rates, table: Table, n: int) -> None:
 
 
 @kernel
-def step_tangents(motion: Motion, rates: Rates, table: Table, n: int, s: float) -> None:
+def step_tangents(motion: TangentMotion, rates: TangentRates, table: TangentTable, n: int, s: float) -> None:
     """Write the tangents of the bodies in contact at s of a step, whose series are there, to `at`.
 
     All six are summed, so that none waits for another; those of a body that flies are old, and are not written.
@@ -180,7 +194,7 @@ def ends_within(series: Array, first: int, n: int, s: float) -> bool:
 
 
 @kernel
-def exact_length(motion: Motion, table: Table, n: int, s: float) -> float:
+def exact_length(motion: TangentMotion, table: TangentTable, n: int, s: float) -> float:
     """The largest s 2^-k at which the last terms of all tangents are below NEGLECTED of their first ones.
 
     The step of the run is as long as its own motion allows, which may have died down where its tangents have not.

@@ -17,7 +17,7 @@ from grasp_ros.exact.compilation.vectors import HALF, load_half, store
 from grasp_ros.exact.impact import elastic_force, elastic_slope
 from grasp_ros.exact.records import Array
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, U, V
-from grasp_ros.sensitivity.tangents import STATES, Motion, Rates, copy_matrix
+from grasp_ros.sensitivity.tangents import STATES, TangentMotion, TangentRates, copy_matrix
 
 SERIES = 16  # terms of an exponential whose argument is below LARGEST_ARGUMENT
 LARGEST_ARGUMENT = 0.25
@@ -84,7 +84,7 @@ def flow_of_body(stiffness: float, damping: float, t: float, m: Array) -> None:
 
 
 @kernel
-def fly_tangent(motion: Motion, rates: Rates, m: Array, body: Body, span: float) -> None:
+def fly_tangent(motion: TangentMotion, rates: TangentRates, m: Array, body: Body, span: float) -> None:
     """Write the tangents of a body after `span` s of flight to `at`."""
     row, own, v = motion.bodies[body], rates.acting[body], velocity_lane(body)
     mass, x_0, v_0 = row[Of.MASS], motion.before[v - 1], motion.before[v]
@@ -103,7 +103,7 @@ def fly_tangent(motion: Motion, rates: Rates, m: Array, body: Body, span: float)
 
 
 @kernel
-def couple(motion: Motion, side: Body, a: Array) -> float:
+def couple(motion: TangentMotion, side: Body, a: Array) -> float:
     """Add the slope of the impact force of a pair in contact at rest to the matrix; returns a bound of its rates."""
     u, hertzian, loss = motion.before[U.L + side], motion.pairs[side, Law.HERTZIAN], motion.pairs[side, Law.DISSIPATION]
     slope, drag = elastic_slope(hertzian, max(u, 0.0)), loss * elastic_force(hertzian, max(u, 0.0))
@@ -131,7 +131,7 @@ def product_6x6(a: Array, b: Array, out: Array) -> None:
 
 
 @kernel
-def rate_at_rest(motion: Motion, a: Array) -> float:
+def rate_at_rest(motion: TangentMotion, a: Array) -> float:
     """Write the matrix of the tangents' equations at rest; returns a bound of its rates, 1/s."""
     a[:] = 0.0
     rate = 0.0
@@ -147,7 +147,7 @@ def rate_at_rest(motion: Motion, a: Array) -> float:
 
 
 @kernel
-def drive_at_rest(motion: Motion, rates: Rates, body: Body, j: int) -> float:
+def drive_at_rest(motion: TangentMotion, rates: TangentRates, body: Body, j: int) -> float:
     """What accelerates the tangent of a body at rest by itself, m/s^2 by the unit of a direction."""
     row, v = rates.acting[body], velocity_lane(body)
     push = row[Of.FORCE, j] - row[Of.STIFFNESS, j] * motion.before[v - 1]
@@ -159,7 +159,7 @@ def drive_at_rest(motion: Motion, rates: Rates, body: Body, j: int) -> float:
 
 
 @kernel
-def rest_tangent(motion: Motion, rates: Rates, m: Array, span: float) -> None:
+def rest_tangent(motion: TangentMotion, rates: TangentRates, m: Array, span: float) -> None:
     """Write the tangents after `span` s at rest to `at`."""
     a, flow, integral, term, spare = m[0], m[1], m[2], m[3], m[4]
     times = halvings(rate_at_rest(motion, a), span)

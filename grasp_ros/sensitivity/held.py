@@ -10,11 +10,11 @@ from grasp_ros.exact.driver.intervals import feedback
 from grasp_ros.exact.records import Array, Integers
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Of, Slide
-from grasp_ros.sensitivity.tangents import Inputs, Rates
+from grasp_ros.sensitivity.tangents import Inputs, TangentRates
 
 
 @kernel
-def act(mode: Integers, rates: Rates, inputs: Inputs) -> None:
+def act(mode: Integers, rates: TangentRates, inputs: Inputs) -> None:
     """Write how the directions change what acts on the bodies in a segment."""
     for body in (LEFT, RIGHT, OBJECT):
         for j in range(inputs.force.shape[1]):

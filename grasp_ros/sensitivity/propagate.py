@@ -28,10 +28,10 @@ from grasp_ros.sensitivity.held import act, enter_tick
 from grasp_ros.sensitivity.tangents import (
     UNSEEN,
     Count,
-    Motion,
     Number,
-    Outputs,
-    Rates,
+    TangentMotion,
+    TangentOutputs,
+    TangentRates,
     Tangents,
     copy_matrix,
     tangents_at,
@@ -41,7 +41,7 @@ GAP = 64.0 * EPS  # of the time: what is longer was rest, of which no segment te
 
 
 @kernel
-def impact_now(motion: Motion, side: Body) -> float:
+def impact_now(motion: TangentMotion, side: Body) -> float:
     """Impact force of a pair at the begin of a segment, N."""
     if motion.mode[side] != Pair.CONTACT:
         return 0.0
@@ -57,7 +57,7 @@ def scale_object(moved: Array, factor: float) -> None:
 
 
 @kernel
-def turning_ratio(motion: Motion, old: float) -> float:
+def turning_ratio(motion: TangentMotion, old: float) -> float:
     """Acceleration of an object after it turns, by that before, under its constant force before; nan: it had none."""
     push, new = impact_now(motion, LEFT) - impact_now(motion, RIGHT), motion.bodies[OBJECT]
     push -= new[Of.STIFFNESS] * motion.before[X.O] + new[Of.DAMPING] * motion.before[V.O]
@@ -66,7 +66,7 @@ def turning_ratio(motion: Motion, old: float) -> float:
 
 
 @kernel
-def pass_friction(motion: Motion, moved: Array, outputs: Outputs) -> None:
+def pass_friction(motion: TangentMotion, moved: Array, outputs: TangentOutputs) -> None:
     """The jump of the tangents where the mode of an object under dry friction has changed."""
     before, now = outputs.counts[Count.SLIDE], motion.mode[OBJECT]
     if now == Slide.FREE or now == before:
@@ -87,7 +87,7 @@ def pass_friction(motion: Motion, moved: Array, outputs: Outputs) -> None:
 
 
 @kernel
-def check_glide(motion: Motion, rates: Rates, outputs: Outputs) -> None:
+def check_glide(motion: TangentMotion, rates: TangentRates, outputs: TangentOutputs) -> None:
     """Note a run that begins with a pair at u' = -1/p which nothing moves off: a change to one side has a force."""
     row, y = motion.bodies[OBJECT], motion.before
     pushed = (impact_now(motion, LEFT) - impact_now(motion, RIGHT)) / row[Of.MASS]
@@ -105,7 +105,7 @@ def check_glide(motion: Motion, rates: Rates, outputs: Outputs) -> None:
 
 
 @kernel
-def write_output(motion: Motion, outputs: Outputs, rates: Rates) -> None:
+def write_output(motion: TangentMotion, outputs: TangentOutputs, rates: TangentRates) -> None:
     """Write what stands in `at` to the next output, and the forces that act where they are wanted."""
     row = outputs.rows[outputs.counts[Count.FILLED]]
     copy_matrix(outputs.out[row], rates.at)
@@ -120,14 +120,14 @@ def write_output(motion: Motion, outputs: Outputs, rates: Rates) -> None:
 
 
 @kernel
-def next_output(outputs: Outputs) -> float:
+def next_output(outputs: TangentOutputs) -> float:
     """Time of the next output, s; inf: there is none."""
     row = outputs.counts[Count.FILLED]
     return outputs.grid[row] if row < outputs.grid.shape[0] else math.inf
 
 
 @kernel
-def since(outputs: Outputs, begin: float, span: float) -> float:
+def since(outputs: TangentOutputs, begin: float, span: float) -> float:
     """Time from a begin to the next output, within a span."""
     return min(max(next_output(outputs) - begin, 0.0), span)
 
@@ -167,7 +167,7 @@ def arrive(t: Tangents, interval: float, time: float) -> None:
 
 
 @kernel
-def add_neglected(motion: Motion, moved: Array, side: Body, span: float) -> None:
+def add_neglected(motion: TangentMotion, moved: Array, side: Body, span: float) -> None:
     """Add the slope of the force of a pair that begins or leaves: its impulse is below rounding, its slope is not.
 
     It begins from u = 0, or leaves to it, by a power of the time.

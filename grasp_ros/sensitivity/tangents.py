@@ -77,7 +77,7 @@ class Number(IntEnum):
     FORCE = 3  # constant force on the object in the last segment, its friction in it, N
 
 
-class Motion(NamedTuple):
+class TangentMotion(NamedTuple):
     """The segment that the run has just made."""
 
     c: Array  # its Taylor table: the run has done with it
@@ -89,7 +89,7 @@ class Motion(NamedTuple):
     before: Array  # (8,) state at its begin
 
 
-class Rates(NamedTuple):
+class TangentRates(NamedTuple):
     """Derivatives of its state, and of the numbers that act in it; with zeros up to a multiple N of HALF."""
 
     x: Array  # (6, N) of the state at its begin, then at its end
@@ -98,7 +98,7 @@ class Rates(NamedTuple):
     law: Array  # (2, 2, N) of H and p
 
 
-class Table(NamedTuple):
+class TangentTable(NamedTuple):
     """Scratch: the series of a Taylor step."""
 
     series: Array  # (N / HALF BLOCK,) of the tangents, HALF directions after another
@@ -122,7 +122,7 @@ class Inputs(NamedTuple):
     external: Array  # (ticks, 3, n)
 
 
-class Outputs(NamedTuple):
+class TangentOutputs(NamedTuple):
     """What is written, and where it stands."""
 
     counts: Integers  # see `Count`
@@ -136,11 +136,11 @@ class Outputs(NamedTuple):
 class Tangents(NamedTuple):
     """The tangents of a run with n directions, in parts: a kernel that is handed all of them compiles for minutes."""
 
-    motion: Motion
-    rates: Rates
-    table: Table
+    motion: TangentMotion
+    rates: TangentRates
+    table: TangentTable
     inputs: Inputs
-    outputs: Outputs
+    outputs: TangentOutputs
     matrices: Array  # (5, 6, 6) scratch
 
 
@@ -160,13 +160,13 @@ def tangents_of(plant: Plant, state: State, changes: Directions, times: Array, e
     n, m, order, x = changes.state.shape[1], len(times), np.argsort(times, kind="stable"), _padded(changes.state)
     wide, counts, numbers = x.shape[1], np.zeros(len(Count), dtype=np.int64), np.zeros(len(Number))
     counts[Count.TICK], counts[Count.SLIDE], numbers[Number.CORNER] = -1, UNSEEN, math.inf
-    motion = Motion(np.zeros(0), state.y, state.mode, state.clock, plant.bodies, plant.pairs, state.y.copy())
-    rates = Rates(x, zeros(STATES, wide), zeros(3, 4, wide), _padded(changes.pairs))
-    table = Table(zeros(wide // HALF * BLOCK), np.zeros((ROWS, TERMS)), zeros(5 * WEIGHTS), zeros(2, ROOM),
+    motion = TangentMotion(np.zeros(0), state.y, state.mode, state.clock, plant.bodies, plant.pairs, state.y.copy())
+    rates = TangentRates(x, zeros(STATES, wide), zeros(3, 4, wide), _padded(changes.pairs))
+    table = TangentTable(zeros(wide // HALF * BLOCK), np.zeros((ROWS, TERMS)), zeros(5 * WEIGHTS), zeros(2, ROOM),
                   zeros(3, ROOM), zeros(wide // HALF * SUMS))
     inputs = Inputs(changes.bodies, np.zeros((3, n)), changes.coulomb[0], np.zeros((2, COLUMNS)),
                     np.zeros((2, COLUMNS, n)), np.zeros((1, 2, 2)), np.zeros((0, 2, n)), changes.external)
-    outputs = Outputs(counts, numbers, times[order], order, np.zeros((m, STATES, n)), np.zeros((e, 3, 1 + n)))
+    outputs = TangentOutputs(counts, numbers, times[order], order, np.zeros((m, STATES, n)), np.zeros((e, 3, 1 + n)))
     return Tangents(motion, rates, table, inputs, outputs, np.zeros((5, STATES, STATES)))
 
 

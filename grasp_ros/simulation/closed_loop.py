@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from grasp_ros.exact.driver.user_controller import UserController
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.exact.records import Loop as KernelLoop
-from grasp_ros.exact.records import new_place, one_interval
+from grasp_ros.exact.records import Loop, new_place, one_interval
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.control import ControlLaw, Law
@@ -28,7 +27,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.own_law import begin
 from grasp_ros.simulation.sampled_plant import Outputs, SampledPlant
-from grasp_ros.simulation.ticks import Loop, new_loop
+from grasp_ros.simulation.ticks import LoopRecord, new_loop
 
 Progress = Callable[[float], object] | None
 PATIENCE = 0.1  # s that a block of ticks may take
@@ -72,8 +71,8 @@ def check_changes(scene: Scene, held: bool, changes: Changes, by_user: Iterable[
 
 
 def drive_sampled(
-    scene: Scene, grid: Array, loop: Loop, changes: Changes, by_user: Mapping[int, UserController], progress: Progress,
-    integrator: Integrator,
+    scene: Scene, grid: Array, loop: LoopRecord, changes: Changes, by_user: Mapping[int, UserController],
+    progress: Progress, integrator: Integrator,
 ) -> Array:
     """States (n, 6) under controllers that answer at every tick; only the rows reached, if the integrator stops.
 
@@ -133,7 +132,7 @@ def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
     while len(block) > 1:
         ticks = np.array(block)
         outputs, _ = outputs_within(grid, ticks, scene.period_ns)
-        loop = KernelLoop(
+        loop = Loop(
             np.diff(ticks) * scene.period_ns / NANOSECONDS, ticks * scene.period_ns / NANOSECONDS, outputs.bounds,
             new_place(), np.empty((len(ticks) - 1, 3)), system.external_over(ticks[:-1]),
         )
@@ -157,7 +156,7 @@ def outputs_within(grid: Array, ticks: NDArray[np.int64], period_ns: int) -> tup
 
 
 def drive(
-    scene: Scene, integrator: Integrator, sampled: bool, grid: Array, loop: Loop | None = None,
+    scene: Scene, integrator: Integrator, sampled: bool, grid: Array, loop: LoopRecord | None = None,
     changes: Changes = NO_CHANGES, by_user: Mapping[int, UserController] = NO_USER_CONTROLLERS,
     progress: Progress = None,
 ) -> Array:
@@ -173,7 +172,7 @@ def solve(
     scene: Scene, grid: Array, method: str, setting: float, sampled: bool, max_events: int, max_work: int,
     changes: Changes = NO_CHANGES, by_user: Mapping[int, UserController] = NO_USER_CONTROLLERS,
     progress: Progress = None,
-) -> tuple[Solution, Loop | None]:
+) -> tuple[Solution, LoopRecord | None]:
     """States at ascending output times (n,), events and counters, and what went through a sampled loop.
 
     All arguments have been checked. Columns of bodies that are not there are NaN.
@@ -186,4 +185,4 @@ def solve(
     ))
     if absent := scene.system.absent_columns:  # numpy takes its time for no columns, too
         found.state[:, absent] = np.nan
-    return found, None if loop is None else Loop(*(rows[: len(found.state)] for rows in loop))
+    return found, None if loop is None else LoopRecord(*(rows[: len(found.state)] for rows in loop))

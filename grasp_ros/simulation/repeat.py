@@ -21,7 +21,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.simulation.closed_loop import outputs_within, solve
 from grasp_ros.simulation.sampled_plant import SampledPlant
-from grasp_ros.simulation.ticks import Loop, tick_of, tick_times
+from grasp_ros.simulation.ticks import LoopRecord, tick_of, tick_times
 
 if TYPE_CHECKING:  # it imports this file
     from grasp_ros.simulation.trajectory import Trajectory
@@ -91,7 +91,7 @@ def breaks_of(run: Trajectory) -> Array:
     return np.asarray(found[found <= end])
 
 
-def _solved(run: Trajectory, grid: Array) -> tuple[Solution, Loop | None]:
+def _solved(run: Trajectory, grid: Array) -> tuple[Solution, LoopRecord | None]:
     """A run again, with the laws of its scene."""
     if run.controllers:
         raise Refused(f"{run.scene.name}: its controllers cannot be asked again; allowed: output times at every control"

@@ -25,13 +25,13 @@ def tick_of(scene: Scene, t: Array) -> NDArray[np.int64]:
     return np.minimum(ticks, scene.ticks)
 
 
-class Loop(NamedTuple):
+class LoopRecord(NamedTuple):
     """What went through a sampled loop, at n output times; see `Trajectory.command` and `Trajectory.inputs`."""
 
     command: Array  # (n, 2), N
     inputs: Array  # (n, 3), N by body
 
 
-def new_loop(n: int) -> Loop:
+def new_loop(n: int) -> LoopRecord:
     """A record of n output times, to be filled."""
-    return Loop(np.empty((n, 2)), np.full((n, 3), np.nan))
+    return LoopRecord(np.empty((n, 2)), np.full((n, 3), np.nan))

@@ -30,7 +30,7 @@ from grasp_ros.simulation.contacts import contact_table, side_of
 from grasp_ros.simulation.repeat import breaks_of, states_at
 from grasp_ros.simulation.sections import Function, Section, as_function, crossings
 from grasp_ros.simulation.tables import Tabular
-from grasp_ros.simulation.ticks import Loop, tick_of
+from grasp_ros.simulation.ticks import LoopRecord, tick_of
 
 if TYPE_CHECKING:
     from grasp_ros.simulation.differentiate import Sensitivity
@@ -51,7 +51,7 @@ class Trajectory(Tabular, Frozen):
     t : array (n,), s
     state : array (n, 6), m and m/s
         x_l, v_l, x_o, v_o, x_r, v_r; NaN for a body that is not there.
-    loop : Loop or None
+    loop : LoopRecord or None
         Commands and inputs of sampled controllers at the output times; None under continuous feedback.
     event_table : array (m, 5)
         Time in s, side, kind, u in m and u' in m/s of every event, in the order of time; see `events`.
@@ -76,7 +76,7 @@ class Trajectory(Tabular, Frozen):
     scene: Scene
     t: Array
     state: Array
-    loop: Loop | None
+    loop: LoopRecord | None
     event_table: Array
     work: np.ndarray
     status: Status

@@ -16,7 +16,7 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.files import decoding, reading
 from grasp_ros.scene.npz import TEXT, read_npz
-from grasp_ros.simulation.ticks import Loop, tick_of
+from grasp_ros.simulation.ticks import LoopRecord, tick_of
 from grasp_ros.simulation.trajectory import Trajectory
 
 
@@ -36,7 +36,7 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
         t, state, command, inputs, events = (data[name].astype(float, casting="same_kind") for name in (
             "t", "state", "command", "inputs", "events"))
         found = Trajectory(
-            scene, t, state, Loop(command, inputs) if data["sampled"] else None, events,
+            scene, t, state, LoopRecord(command, inputs) if data["sampled"] else None, events,
             data["work"].astype(np.int64, casting="same_kind"), Status[words["status"]], find(words["method"]).name,
             float(data["setting"]), words["stop"],
             {side: name for side, name in zip(SIDES, data["controllers"].tolist(), strict=True) if name},

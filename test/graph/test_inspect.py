@@ -16,7 +16,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.simulation import Trajectory, simulate
-from grasp_ros.simulation.ticks import Loop
+from grasp_ros.simulation.ticks import LoopRecord
 from lab.drills import recorder
 
 NOISY = ["time.duration_s=0.5", "loop.delay_ticks=3", "left_sensor.noise_seed=7", "left_sensor.position_noise_m=1e-3",
@@ -62,7 +62,7 @@ def test_verify_says_in_numbers_what_differs(recorded: tuple[Path, Trajectory], 
                      "difference": None, "same_without_ROS": True, "controllers": {"left": own, "right": own}}
     command_of_all = run.command.copy()
     command_of_all[20, RIGHT] += 1e-3
-    recorder.write(tmp_path / "wrong", replace(run, loop=Loop(command_of_all, run.inputs)))
+    recorder.write(tmp_path / "wrong", replace(run, loop=LoopRecord(command_of_all, run.inputs)))
     asked = command("verify", str(tmp_path / "wrong"), "--json")
     found = json.loads(asked.stdout)
     assert (asked.returncode, found["holds"], found["controllers"]["right"]["of_the_scene"]) == (1, False, 500)

@@ -12,7 +12,7 @@ import pytest
 
 import grasp_ros as gr
 from grasp_ros.maps.plan import Axis
-from grasp_ros.optimization.problem import Problem, read_bound
+from grasp_ros.optimization.problem import DesignProblem, read_bound
 from grasp_ros.optimization.search import front
 from grasp_ros.simulation.summary import summary
 
@@ -63,7 +63,7 @@ def test_a_body_that_is_not_there_has_no_part_in_a_group() -> None:
 def test_no_choice_along_two_outcomes_is_better_in_both(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("grasp_ros.optimization.search.FRONT", 4)
     scene = gr.load("case_01", ["left_feedback.velocity_gain_Ns_per_m=7", "right_feedback.velocity_gain_Ns_per_m=7"])
-    problem = Problem(scene, [Axis(BOTH_KP, 1.0, 40.0)], ["settling_time", "peak_input"])
+    problem = DesignProblem(scene, [Axis(BOTH_KP, 1.0, 40.0)], ["settling_time", "peak_input"])
     choices = front(problem)
     times, inputs = ([own.outcomes[name] for own in choices] for name in problem.minimise)
     assert len(choices) >= 3

@@ -163,13 +163,12 @@ class Recording(Tabular, Frozen):
             raise Refused(f"{self.path}: allowed: a bag with every tick from the begin, and without a reset")
         if len(self.tick) < 2 or not np.isfinite(acted[:-1]).all():
             raise Refused(f"{self.path}: allowed: two ticks or more, and the forces that acted at each")
-        numbers = {"time.duration_s": float(self.t[-1])}
-        if self.scene.system.delay:
-            numbers["loop.delay_ticks"] = 0  # the forces have been delayed
-        forces = np.vstack([acted[:-1], np.zeros(2)]).T.tolist()  # from the last tick on nothing acts
+        wait = self.scene.system.delay
+        forces = np.vstack([acted[wait:-1], np.zeros((1 + wait, 2))]).T.tolist()  # from the last tick on nothing acts
         laws = {side: partial(_recorded, forces[body]) for side, body in SIDES.items()
                 if body in self.scene.system.laws}
-        return simulate(self.scene.changed(numbers), sampled=True, controllers=laws, setting=self.running.accuracy)
+        scene = self.scene.changed({"time.duration_s": float(self.t[-1])})
+        return simulate(scene, sampled=True, controllers=laws, setting=self.running.accuracy)
 
     @property
     def whole(self) -> bool:

@@ -151,7 +151,7 @@ class Monitor(PeerNode):
             scene.period_ns, scene.ticks * scene.period_ns, scene.system.delay,
         )
         self._limits = Limits(self, scene)
-        topics = (RUN, SCENE, CLOCK, *scene.topics, *CHANGES.values(), *beside)
+        topics = (RUN, SCENE, CLOCK, *scene.topics, *CHANGES.values(), TIMING)
         names = {topic: self.resolve_topic_name(topic.name) for topic in topics}
         self._recorder = Recorder(self._path, scene, versions(), names, running)
         self._soon = self.wall_timer(MOST_SECONDS, self._complete)

@@ -90,7 +90,8 @@ def _start(context: Context) -> None:
     except RuntimeError as error:  # the base of what rcl raises
         variables = [f"{name}={value}" for name, value in sorted(os.environ.items()) if name.startswith(OF_ROS)]
         words = " ".join([*sys.argv[1:], *variables])
-        raise Refused(f"ROS does not start: {' '.join(str(error).split())}; it was given {words}") from None
+        why = " ".join(str(error).split()).partition(", at /")[0]  # where in rcl
+        raise Refused(f"ROS does not start: {why}; it was given {words}") from None
 
 
 def _spin(nodes: Sequence[GraspNode], received: Sequence[int], names: str) -> None:
