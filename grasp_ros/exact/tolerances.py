@@ -25,8 +25,8 @@ REST = 2.0**-49  # of the scale of a scene: eight roundings, which forces that b
 SETTLED = 40.0  # time constants after which a flight may rest: e^-40 is less than a rounding
 
 # Ways that have digits of their own.
-SHORT_FLIGHT, FAR_SHORT = 0.25, 1.0  # of the time constants: there the power series has all digits; where rest is FAR
-FAR = 4.0  # times the position: a rest position whose roundings would take digits of a flight that hardly moves
+SHORT_FLIGHT, FAR_SHORT = 0.25, 1.0  # of the time constants: shorter flights take the power series; the second if FAR
+FAR = 4.0  # times the position, of a rest position: its roundings would take digits of a flight that hardly moves
 SHORT_START = 0.2  # of the time constants, well within those of a short flight
 SHORT_WAY = 0.125  # of a penetration: a longer way has roundings like those of its end
 
@@ -34,7 +34,7 @@ SHORT_WAY = 0.125  # of a penetration: a longer way has roundings like those of 
 DEFECT = 100.0  # times accuracy and rounding: what neglected terms may leave of an identity at the end of a step
 NOISE = 100.0 * EPS  # of a polynomial with some tens of terms
 STILL = 2.0**-4  # of a rounding of the fastest velocity: what a step may neglect of each
-CANCELS = 16.0  # times u' at either end: terms so large leave their roundings in what a relaxation ends with
+CANCELS = 16.0  # times u' at both ends: if its terms are larger, u' at the end of a relaxation is their rounding
 DECAYS = 2.0  # time constants of a damper in a step: e^2 is by how much terms that cancel exceed what is left
 
 # The check of a segment.

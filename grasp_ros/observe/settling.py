@@ -1,4 +1,4 @@
-"""The last time at which each body was outside a bound."""
+"""The last time at which each body was outside a bound, and when all have settled, which V_c proves."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def _growth(scene: Scene, places: list[int], accuracy: float, pieces: int) -> Ar
 def _at_right_angles(moved: Array, stuck: bool) -> tuple[np.ndarray, Array, Array] | None:
     """Which tangents (n, k) are kept, the same at right angles, and how long each was beside those before it.
 
-    Without those that an object that has stuck has lost; None if another one has hardly any part of its own.
+    Tangents that a stick of the object has made dependent are dropped; None if others nearly are.
     """
     kept: np.ndarray = np.arange(moved.shape[1])
     while True:

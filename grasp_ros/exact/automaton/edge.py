@@ -51,8 +51,8 @@ def impact_beside(plant: Plant, state: State, side: Body) -> tuple[float, float]
 def leaning(plant: Plant, state: State, side: Body) -> Leaning:
     """The first derivative of u of a pair at rest that differs from zero by more than its rounding.
 
-    The force of the other pair takes part with its value and its rate. Where that pair begins at u = 0 itself, its
-    force presses this one if nothing else moves it.
+    The force of the other pair takes part with its value and its rate. Where that pair begins at u = 0, too, and
+    nothing else decides, the force that it is going to have closes this one.
     """
     y, beside = state.y, other(side)
     closed = state.mode[beside] in (Pair.CONTACT, Pair.BEGINNING) and plant.bodies[OBJECT, Of.MASS] < math.inf
@@ -177,7 +177,7 @@ def surface_side(plant: Plant, state: State, side: Body) -> float:
 
 @kernel
 def stays(plant: Plant, state: State, side: Body) -> bool:
-    """Whether the bodies of a pair never move apart or together by themselves, but for its u'."""
+    """Whether u' of a pair stays as it is without impacts."""
     return bool(own_difference(plant, state.y, side).order == NEVER)
 
 

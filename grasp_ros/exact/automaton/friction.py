@@ -142,9 +142,9 @@ def since_certain(tables: Tables, plant: Plant, mode: Integers, n: int, h: float
 
 @kernel
 def overcome(f: Array, n: int, h: float, noise: tuple[float, float], work: Integers) -> float:
-    """First s in (0, h] at which a push is beyond the friction by f(s), and that more than the rounding of f.
+    """First s in (0, h] at which f, a push less the friction, exceeds the rounding of f.
 
-    That at 0 counts, if it hides f there, otherwise the smaller one of those at 0 and at h.
+    `noise` is that at 0 and at h. Where f(0) is within its rounding, that counts, and otherwise the smaller one.
     """
     if f[0] > noise[0]:
         return EPS * EPS * h
@@ -174,8 +174,8 @@ def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, noise: tuple[
 def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: float, work: Integers) -> Candidate:
     """First s in a Taylor step of length h at which an object under dry friction stops or slips.
 
-    `tables.at` is at h, or lost. The next order decides of one that has just slipped, unless more than half of the
-    rounding pushes it. What hides a push may be far less at h.
+    `tables.at` is at h, or lost. Of an object that has just slipped, at rest, an acceleration below half of its
+    rounding counts as 0, so that the next order decides. The rounding of a push may be far less at h than at 0.
     """
     slide, row, c = state.mode[OBJECT], tables.row, tables.c
     if slide != Slide.STUCK:

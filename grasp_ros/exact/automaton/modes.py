@@ -119,7 +119,7 @@ def settle(state: State, side: Body, following: Pair, out: Output) -> None:
 
 @inlined
 def waits(state: State, side: Body) -> bool:
-    """Whether a pair is at u = u' = 0: without force, or about to begin beside one that may have begun anew."""
+    """Whether a pair is at u = u' = 0, without force, or in contact: the other pair may have changed."""
     return state.mode[side] in (Pair.OPEN, Pair.RESTING, Pair.CONTACT, Pair.BEGINNING) and is_resting(state.y, side)
 
 
@@ -193,7 +193,10 @@ def let_leave(plant: Plant, state: State, settings: Settings) -> None:
 
 @inlined
 def make_transitions(plant: Plant, state: State, ends: Ends, end: float, out: Output) -> None:
-    """Make all transitions within a few roundings of the end; lost forces hide no more what pushes a stuck object."""
+    """Make all transitions within a few roundings of the end.
+
+    Where a pair changes, the rounding of its force is gone: whether a stuck object slips is decided again.
+    """
     (left, right, slide, _), last = ends, end * TOGETHER
     leaves_l = left.when <= last and left.what == Transition.CLAMP and glides(plant, state, LEFT)
     leaves_r = right.when <= last and right.what == Transition.CLAMP and glides(plant, state, RIGHT)

@@ -31,18 +31,15 @@ from grasp_ros.exact.compilation.kernel_cache import (
 class Part(JITCodeLibrary):
     """The code of a function that others call, without machine code: theirs has a copy of it.
 
-    Machine code of every function by itself would be a fifth of the time of compiling.
+    Machine code of every function by itself would be a fifth of the time of compiling, and optimizing it as a whole, as
+    the code of a door is, with all that is called, another fourth.
     """
-
-    def _finalize_final_module(self) -> None:
-        self._finalized = True
-
-
-class InlinedPart(Part):
-    """The same of a function that goes into its callers as a whole, which optimize it there."""
 
     def _optimize_final_module(self) -> None:
         pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
 
 
 class Kernel(CPUDispatcher):
@@ -56,7 +53,7 @@ class Kernel(CPUDispatcher):
 
     def compile(self, signature: Any) -> Any:
         """Compile for arguments of some types."""
-        with global_compiler_lock, _libraries(self, InlinedPart if self.targetoptions["forceinline"] else Part):
+        with global_compiler_lock, _parts(self):
             return super().compile(signature)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -65,11 +62,11 @@ class Kernel(CPUDispatcher):
 
 
 @contextmanager
-def _libraries(dispatcher: CPUDispatcher, kind: type[Part]) -> Iterator[None]:
-    """Of what kind the code is that this thread compiles meanwhile; it must have numba's lock."""
+def _parts(dispatcher: CPUDispatcher) -> Iterator[None]:
+    """What this thread compiles meanwhile are parts; it must have numba's lock."""
     own = vars(dispatcher.targetctx.codegen())
     before = own.copy()
-    own.update(_library_class=kind, set_env=_no_environment)
+    own.update(_library_class=Part, set_env=_no_environment)
     try:
         yield
     finally:

@@ -167,7 +167,7 @@ def cut_step(tables: Tables, plant: Plant, state: State, segment: Segment, ends:
 def force_free_length(tables: Tables, plant: Plant, state: State, n: int, s: float) -> float:
     """Part of a step until s in which a pair that begins may be without its force: the longest before one that is not.
 
-    From near the begin on, because what it has come back from is no longer seen.
+    It is doubled from a small one: at a later time a pair that has been beyond the bound may be within it again.
     """
     part = power_of_two(-MOST_HALVINGS)
     while part < 1.0:

@@ -113,9 +113,9 @@ def inverse(size: float) -> float:
 def length(tables: Tables, pulled: tuple[float, float, float], step: Step, settings: Settings, reach: float) -> float:
     """Step in s / unit at which what is neglected is `tolerance` times what moves within `reach`; `pulled`: of `pulls`.
 
-    Velocities move by the step's own motion, and no less than by the rounding of the terms of their equation, and by a
-    part of that of the fastest one; positions with them.
-    The product has a test of its own.
+    A velocity moves by the largest of three: what the step's motion makes of it, the rounding of the terms of its
+    equation, and a part of the rounding of the fastest velocity. A position moves with its velocity. The product
+    has a test of its own.
     """
     c = tables.c
     t, v_l, x_o, v_o, _, v_r, z_l, z_r = motion_sizes(c, reach)

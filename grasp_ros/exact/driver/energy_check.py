@@ -72,8 +72,8 @@ def losses(plant: Plant, before: Level, modes: tuple[int, int], size: float, t: 
 def penetrates(plant: Plant, state: State, side: Body, before: float, size: float, t: float) -> bool:
     """Whether an open pair is closed by more than the roundings of its ways in t s: a touch has been missed.
 
-    A body goes no faster than the energy `size` allows. What has DIED_OUT is not followed. What u was `before`,
-    roundings of a longer way may have left.
+    A body goes no faster than the energy `size` allows. What has DIED_OUT is not followed. A u > 0 that was there
+    `before` is no missed touch: roundings of a longer way may have left it.
     """
     u = state.y[U.L + side]
     if state.mode[side] != Pair.OPEN or u <= max(before, 0.0):

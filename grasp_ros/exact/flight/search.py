@@ -186,8 +186,8 @@ def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: f
     Returns
     -------
     float, float
-        That time, and the one up to which the search has come if it was too long, or else inf: what swings for ever
-        within a rounding of a touch would keep it for as long as the flight is.
+        That time; and, where the search was given up, the time that it has reached, otherwise inf. A pair that swings
+        within a rounding of a touch would keep it for the whole flight.
     """
     step = 0.0
     for _ in range(MAX_ITERATIONS):

@@ -58,7 +58,7 @@ class Limits:
 
 
 class Sources:
-    """The sources of a topic as its reader has them; for some seconds after a change a message may be anybody's."""
+    """The sources of a topic as its reader has them; for some seconds after a change the sender is unknown."""
 
     def __init__(self, subscription: Subscription, seconds: float) -> None:
         # Asked at every message, in the order of the messages: an event of the executor would come before or after.
