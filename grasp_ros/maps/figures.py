@@ -46,14 +46,17 @@ def heat(axes: Axes, plan: Plan, values: np.ndarray, label: str) -> None:
     shown = np.ma.masked_invalid(values)
     colors = colormaps[COLORS].with_extremes(bad=MISSING)
     y, x = plan.axes
-    if x.log or y.log:
-        mesh: Any = axes.pcolormesh(x.values, y.values, shown, cmap=colors, norm=_norm(shown), rasterized=True)
-    else:
-        extent = (x.low, x.high, y.low, y.high)
-        mesh = axes.imshow(shown, extent=extent, origin="lower", aspect="auto", cmap=colors, norm=_norm(shown),
-                           interpolation="none")
+    mesh = axes.pcolormesh(_edges(x), _edges(y), shown, cmap=colors, norm=_norm(shown), rasterized=True)
     axes.figure.colorbar(mesh, ax=axes, label=label)
     axes.set(xlabel=label_of(x.name), xscale=_scale(x), ylabel=label_of(y.name), yscale=_scale(y))
+
+
+def _edges(axis: Axis) -> np.ndarray:
+    """Between which the pixels lie (n + 1,): halfway between the values, and as far beyond the first and the last."""
+    at = np.log(axis.values) if axis.log else axis.values
+    step = np.diff(at)
+    edges = np.concatenate([at[:1] - 0.5 * step[:1], at[:-1] + 0.5 * step, at[-1:] + 0.5 * step[-1:]])
+    return np.exp(edges) if axis.log else edges
 
 
 def _norm(shown: Any) -> Normalize:

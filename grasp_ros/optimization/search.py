@@ -26,6 +26,7 @@ from grasp_ros.simulation.progress import Told, showing
 
 MEMBERS, GENERATIONS = 16, 500  # members of a population for each free number; generations at most
 AGREE = 1e-14  # standard deviation of what a population reaches, relative, at which a search ends
+BESIDE = 0.01  # part of a range, from whose end a choice is so far that it is tried, too
 NEAR, PLATEAU = 1e-5, 50  # parts of the ranges within which it then is; generations for which it goes on elsewhere
 FRONT = 12  # choices along two outcomes
 BROKEN, NOTHING = 1e100, 1e140  # above every outcome: a bound is broken; there is no outcome; squares are finite
@@ -123,15 +124,25 @@ def search(problem: DesignProblem, seed: int = 0, progress: Told | None = None) 
     found = differential_evolution(
         function, [(0.0, 1.0)] * len(problem.axes), popsize=MEMBERS, maxiter=GENERATIONS, tol=0.0, atol=-1.0, rng=seed,
         polish=False, init="sobol", updating="deferred", vectorized=True, callback=is_over)  # never by its own rule
-    if found.fun >= BROKEN:
+    places = _with_ends(found.x)
+    reached = function(places.T)
+    place, least = places[int(np.argmin(reached))], float(reached.min())
+    if least >= BROKEN:
         wish = " and ".join(f"{bound.outcome} <= {bound.most:g}" for bound in problem.bounds)
-        stops = problem.found(problem.numbers(found.x[None])).stops
+        stops = problem.found(problem.numbers(place[None])).stops
         raise Refused(f"{problem.scene.name}: none of {runs} choices has a finite {problem.minimise[0]}"
                       + (f" with {wish}" if wish else "") + (f"; {stops[0]}" if stops else problem.why_unsettled()))
-    best = problem.numbers(found.x[None])
+    best = problem.numbers(place[None])
     outcomes = {name: float(values[0]) for name, values in problem.found(best).outcomes.items()}
     numbers = {key: float(values[0]) for key, values in best.items()}
     return Design(problem.scene.changed(numbers), numbers, outcomes, runs)
+
+
+def _with_ends(place: Array) -> Array:
+    """A place (k,), and others (n, k) with numbers at the ends of ranges: a population may stop just before one."""
+    ends = np.where(np.abs(place - np.rint(place)) < BESIDE, np.rint(place), place)
+    single = np.where(np.eye(len(place), dtype=bool), ends, place)
+    return np.vstack([place, ends, single])
 
 
 def costs(problem: DesignProblem, parts: Array) -> Array:

@@ -11,7 +11,7 @@ from numba.core.codegen import JITCodeLibrary
 
 from grasp_ros import exact
 from grasp_ros.exact.compilation import jit
-from grasp_ros.exact.compilation.numba_internals import InlinedPart, Part
+from grasp_ros.exact.compilation.numba_internals import Part
 
 PARAMETERS, BODY = 8, 40
 DOORS = {"advance": 16}  # blocks of numbers, see its docstring
@@ -67,7 +67,7 @@ def test_only_a_door_has_machine_code() -> None:
     def sum_of(x: float) -> float:
         return float(half(x) + double(x))
 
-    for function, kind in ((half, Part), (double, InlinedPart), (sum_of, JITCodeLibrary)):
+    for function, kind in ((half, Part), (double, Part), (sum_of, JITCodeLibrary)):
         function.compile("float64(float64)")
         [compiled] = function.overloads.values()
         assert type(compiled.library) is kind

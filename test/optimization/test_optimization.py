@@ -53,6 +53,12 @@ def test_a_search_does_not_end_where_many_choices_are_alike() -> None:
     assert max(found) == pytest.approx(-0.00097076, rel=1e-4)
 
 
+def test_a_choice_at_the_end_of_a_range_is_found_there() -> None:
+    found = gr.design(gr.load("case_01", ["time.duration_s=3"]), {"left_feedback.velocity_gain_Ns_per_m": (0.5, 10.0)},
+                      "peak_impact_left", {"peak_input_left": 2.0})
+    assert [*found.numbers.values()] == [0.5]
+
+
 def test_a_body_that_is_not_there_has_no_part_in_a_group() -> None:
     scene = gr.load("arm_alone").changed({"left_feedback.set_point_m": 0.0})
     gain = {"left_feedback.velocity_gain_Ns_per_m": (0.5, 20.0)}

@@ -205,8 +205,10 @@ class Recording(Tabular, Frozen):
 
     @property
     def closed(self) -> bool:
-        """Whether V belongs to laws that were known and ran, at every tick."""
-        return bool((self.lyapunov[:, LYAPUNOV_NAMES.index("closed")] == 1.0).all())
+        """Whether V belongs to laws that were known and ran, wherever a force of a controller acted."""
+        known = self.lyapunov[:, LYAPUNOV_NAMES.index("closed")] == 1.0
+        pushed = np.nan_to_num(acted_from(self.tick, self.effort)).any(axis=1) | self.effort.any(axis=1)
+        return bool(known.any() and not (pushed & ~known).any())
 
     @property
     def energy_of(self) -> str:

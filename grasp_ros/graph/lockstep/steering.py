@@ -61,7 +61,7 @@ class Steering:
         self._plant.restart()
 
     def _pause(self, paused: bool, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        if self._paused is paused:
+        if self._paused is paused and not self.steps:  # a step that goes on is ended by either
             return self._answer(response, f"already {'paused' if paused else 'running'} at tick {self._plant.tick}")
         self._paused, self.steps = paused, 0
         self._plant.advance()
