@@ -46,12 +46,12 @@ def heat(axes: Axes, plan: Plan, values: np.ndarray, label: str) -> None:
     shown = np.ma.masked_invalid(values)
     colors = colormaps[COLORS].with_extremes(bad=MISSING)
     y, x = plan.axes
-    mesh = axes.pcolormesh(_edges(x), _edges(y), shown, cmap=colors, norm=_norm(shown), rasterized=True)
+    mesh = axes.pcolormesh(edges(x), edges(y), shown, cmap=colors, norm=_norm(shown), rasterized=True)
     axes.figure.colorbar(mesh, ax=axes, label=label)
     axes.set(xlabel=label_of(x.name), xscale=_scale(x), ylabel=label_of(y.name), yscale=_scale(y))
 
 
-def _edges(axis: Axis) -> np.ndarray:
+def edges(axis: Axis) -> np.ndarray:
     """Between which the pixels lie (n + 1,): halfway between the values, and as far beyond the first and the last."""
     at = np.log(axis.values) if axis.log else axis.values
     step = np.diff(at)

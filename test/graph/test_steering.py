@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from graphs import rewritten
+from graphs import call, rewritten
 from processes import DEADLINE, GRASP, START, ran, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
@@ -84,8 +84,9 @@ def test_one_flipped_bit_in_a_bag_is_found_and_named(steered: tuple[Path, list[i
     assert verify(replace(recording, state=state)).words == f"NOT EQUAL, first at tick {tick}, {words}"
 
 
+@pytest.mark.parametrize("rate", [1.5, 100.0])  # the second is faster than any reader, and waits for it
 def test_a_bag_is_published_again_with_its_clock(
-    recorded: Path, node: tuple[Any, SingleThreadedExecutor], launch: Any
+    recorded: Path, node: tuple[Any, SingleThreadedExecutor], launch: Any, rate: float
 ) -> None:
     peer, slow = node
     slow.remove_node(peer)
@@ -93,24 +94,21 @@ def test_a_bag_is_published_again_with_its_clock(
     for kind, name, rows in ((JointState, "joint_states", seen["states"]), (Clock, "/clock", seen["clock"])):
         note = partial(lambda rows, cdr: rows.append(raw_stamp_ns(cdr)), rows)
         peer.create_subscription(kind, name, note, messages.qos(JOINT_STATES), raw=True)
-    executor = EventsExecutor(context=peer.context)  # whoever is slower than the player loses messages
+    executor = EventsExecutor(context=peer.context)
     executor.add_node(peer)  # which has all its readers: a new one may be missed
-    player = launch(*GRASP, "replay", str(recorded), "--rate", "1.5")
+    player = launch(*GRASP, "replay", str(recorded), "--rate", str(rate))
     begin = time.monotonic()
     while player.poll() is None:
         assert time.monotonic() < begin + DEADLINE
         executor.spin_once(timeout_sec=0.05)
-    assert time.monotonic() - begin > 1.0
+    assert time.monotonic() - begin > 1.5 / rate
     assert player.returncode == 0
     last = time.monotonic()
     while time.monotonic() < last + 0.5:  # what is still on its way
         executor.spin_once(timeout_sec=0.05)
     executor.shutdown()
-    for name, rows in seen.items():  # a reader on a busy machine may lose some, the last too, but not their order
-        assert rows == sorted(rows)
-        assert len(rows) > 100, name
-        assert 2_000_000_000 < rows[-1] <= 3_000_000_000
-        assert {stamp % 1_000_000 for stamp in rows} == {0}
+    for name, rows in seen.items():
+        assert rows == [tick * 1_000_000 for tick in range(3001)], name
 
 
 @pytest.mark.parametrize("kind", [(), ("--free-running",)])
@@ -186,6 +184,20 @@ def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
                   "left_feedback.position_gain: left_controller has no such parameter; did you mean " + gain):
         assert words in err
     assert shell.returncode == 2  # that of the last line, which nobody takes; of one that fails it is 1
+
+
+def test_a_pause_ends_a_step_that_goes_on(node: tuple[Any, SingleThreadedExecutor], launch: Any) -> None:
+    """It said "already paused", and the plant went on."""
+    plant = [*START, "plant", "--ros-args", "-p", "scene:=arm_alone", "-p", "paused:=true", "-p", "steps:=15000"]
+    launch(*plant, stderr=subprocess.DEVNULL)
+    launch(*START, "left_controller", stderr=subprocess.DEVNULL)
+    assert json.loads(call("step", node).message)["goal"]["tick"] == 15000
+    wait_for(lambda: json.loads(call("status", node).message)["tick"] > 10, "some steps")
+    paused = call("pause", node)
+    found = [json.loads(answer.message) for answer in (paused, call("status", node))]
+    assert paused.success
+    assert [(own["state"], own["steps"], own["tick"]) for own in found] == [("paused", 0, found[0]["tick"])] * 2
+    assert found[0]["tick"] < 15000
 
 
 @pytest.mark.parametrize("words", ["yes help | head -n 5000 | {} | head -n 1", "{} <&-"])

@@ -52,6 +52,13 @@ def tiny_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.modules[ensemble.__module__], "CHUNK_S", 1e-9)
 
 
+def test_pixels_of_a_map_lie_around_their_values() -> None:
+    """Those of an axis with a logarithm lay around means, and the first value outside of the picture."""
+    assert figures.edges(Axis("object.mass_kg", 1.0, 3.0, 3)) == pytest.approx([0.5, 1.5, 2.5, 3.5])
+    assert figures.edges(Axis("object.mass_kg", 10.0, 1e7, 4, True)) == pytest.approx([1.0, 1e2, 1e4, 1e6, 1e8])
+
+
+
 def test_a_map_is_an_ensemble_over_two_axes(tmp_path: Path, tiny_chunks: None) -> None:
     plan = small_plan()
     run(plan, tmp_path / "map.zarr")
