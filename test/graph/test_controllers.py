@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,7 @@ from rclpy.executors import SingleThreadedExecutor
 from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.verify import laws_of, verify
+from grasp_ros.graph.ros.node import GraspNode
 from grasp_ros.physics.layout import LEFT
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
 from lab.site.examples import titled
@@ -92,3 +95,27 @@ def test_controllers_that_stay_work_with_the_next_scene_or_say_why_not(launch: A
         if gain:
             assert recording.command[0, LEFT] == -gain * recording.state[0, 0]
     assert "has no right_controller; allowed: left_controller" in (tmp_path / "right").read_text()
+
+
+def test_what_was_confirmed_before_a_command_was_sent_is_seen_before_it() -> None:
+    """A monitor that looked for announcements first took a command with a law that it did not know yet."""
+    seen: list[str] = []
+    announced, commanded = (SimpleNamespace(there=[], callback=seen.append) for _ in range(2))
+
+    class Looking:
+        sent = False
+
+        def waiting(self, topic: SimpleNamespace) -> Iterator[str]:
+            yield from topic.there
+            topic.there.clear()
+            if not self.sent:  # both are, now, one after the other
+                announced.there.append("law")
+                commanded.there.append("command")
+            self.sent = True
+
+    looking = Looking()
+
+    for _ in range(2):
+        GraspNode.take_waiting(looking, [announced, commanded])  # type: ignore[arg-type]
+        assert seen in ([], ["law"], ["law", "command"])
+    assert seen == ["law", "command"]

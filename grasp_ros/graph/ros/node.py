@@ -199,13 +199,15 @@ class GraspNode(ParameterNode):
             yield found[0]
 
     def take_waiting(self, subscriptions: Iterable[Subscription]) -> None:
-        """Take the messages that the executor has not been told of.
+        """Take the messages that the executor has not been told of, in the order in which the subscriptions were made.
 
         Between looking for messages and listening for them, rmw_fastrtps is deaf for a moment: the first message of a
-        topic can lie there until the second comes.
+        topic can lie there until the second comes. The last subscription is looked at first: whoever sends a command
+        when all have confirmed what he announced before finds both taken, or the announcement alone.
         """
-        for subscription in tuple(subscriptions):
-            for message in islice(self.waiting(subscription), SWEEP):
+        taken = [(own, [*islice(self.waiting(own), SWEEP)]) for own in reversed([*subscriptions])]
+        for subscription, came in reversed(taken):
+            for message in came:
                 subscription.callback(message)
 
     def sweep(self) -> None:
