@@ -35,6 +35,7 @@ LOOKS = 2  # at the clock in a period
 GRACE = 0.75  # of a period: how long a late plant waits for an answer; the rest makes up for what it is late
 KEEPS_UP = 3  # periods that the last answer of a controller may be old for the next one to be waited for
 BURST_SECONDS = 0.003  # of catching up at a time, so that commands and services get their turn
+TURN_SECONDS = 0.001  # that they get after a period that takes far longer by itself
 PATIENCE_SECONDS = 0.5  # further behind than this the plant gives up wall time, never a state
 PERCENTILE = 99.0
 OLDEST = 10_000  # periods that are told apart in the ages of commands
@@ -71,6 +72,7 @@ class FreeRunning:
             plant.subscribe(topic, partial(self._on_command, side, topic), raw=True)
         self._limits = Limits(plant, plant.scene)
         self._anchor = math.nan  # wall time of tick 0
+        self._turn = 0.0  # wall time up to which others have their turn
 
     def missing(self) -> list[str]:
         """Commands that nobody sends yet, where it waits for them; else it begins without controllers."""
@@ -125,6 +127,8 @@ class FreeRunning:
 
     def _catch_up(self) -> None:
         plant, begin = self._plant, time.monotonic()
+        if begin < self._turn:
+            return
         late = begin - self._anchor - (plant.tick + 1) * self._period
         if late > PATIENCE_SECONDS:
             self._timing.lost += late
@@ -138,6 +142,8 @@ class FreeRunning:
                 return
             self._timing.period(now, now - due)
             self._step()
+        if time.monotonic() > begin + 2.0 * BURST_SECONDS:
+            self._turn = time.monotonic() + TURN_SECONDS
 
     def _waits(self, now: float) -> bool:
         """Whether a controller that keeps up is about to answer the current state."""
