@@ -23,7 +23,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.effects.force import SECTIONS
-from grasp_ros.scene.topics import CLOCK, CONTACTS, EXTERNAL_FORCES, LYAPUNOV_NAMES
+from grasp_ros.scene.topics import CLOCK, CONTACTS, DIAGNOSTICS, EXTERNAL_FORCES, LYAPUNOV_NAMES, TIMING
 from grasp_ros.simulation import Trajectory, simulate
 from grasp_ros.simulation.tables import Tabular
 
@@ -183,9 +183,13 @@ class Recording(Tabular, Frozen):
 
     @property
     def rates(self) -> dict[str, float]:
-        """Mean rates of the messages in the bag's time, in Hz, by topic; NaN for one message alone."""
-        span = float(self.t[-1] - self.t[0]) or math.nan
-        return {name: (count - 1) / span if count > 1 else math.nan for name, count in self.counts.items()}
+        """Mean rates of the messages in the bag's time, in Hz, by topic.
+
+        NaN for one message alone, and for what goes by wall time.
+        """
+        span, others = float(self.t[-1] - self.t[0]) or math.nan, (DIAGNOSTICS.name, TIMING.name)
+        return {name: (count - 1) / span if count > 1 and name not in others else math.nan
+                for name, count in self.counts.items()}
 
     @property
     def reached(self) -> float:
