@@ -59,16 +59,21 @@ def _plot(options: argparse.Namespace) -> int:
     output = options.output or _beside(options.sources[0], ".gif" if options.animate else ".png")
     if options.animate and (len(options.sources) > 1 or output == STDOUT):
         raise Refused("--animate: allowed: one source, and a file")
-    if (options.panels and options.animate) or (options.speed != 1.0 and not options.animate):
-        raise Refused("--panel: allowed: without --animate; --speed: with it")
+    if options.panels and options.animate:
+        raise Refused("--panel: allowed: without --animate")
+    if options.speed != 1.0 and not options.animate:
+        raise Refused("--speed: allowed: with --animate")
     check_output(output, FORMATS if options.animate else figure_endings(output), options.force, options.sources)
     if options.step is not None and options.method == EXACT:
         raise Refused(f"--step: allowed: with another --method than {EXACT}")
     if options.sensitivity and (options.animate or len(options.sources) > 1):
         raise Refused("--sensitivity: allowed: one scene, without --animate")
     motions = [_motion(source, options, span) for source in options.sources]
-    if span is not None and options.last is None:
-        span = span[0], max(map(plots.end_of, motions))
+    if span is not None:
+        end = max(map(plots.end_of, motions))
+        span = span[0], end if options.last is None else span[1]
+        if not span[0] < span[1] <= end:
+            raise Refused(f"--from {span[0]:g} --to {span[1]:g} is not allowed; allowed: within 0 to {end:g} s")
     if options.animate:
         animate(motions[0], output, speed=options.speed, span=span, width_mm=options.width)
         note(f"written to {output}")
@@ -125,7 +130,7 @@ def _beside(source: str, ending: str) -> Path:
 
 def sensitivity_panels(found: Sensitivity) -> list[plots.Panel]:
     """A panel for each number: derivatives of the positions by it, over time."""
-    return [plots.Panel(partial(_draw, found, place), "derivative, m", 2) for place in range(len(found.keys))]
+    return [plots.Panel(partial(_draw, found, place), "derivative, m per unit", 2) for place in range(len(found.keys))]
 
 
 def _draw(found: Sensitivity, place: int, axes: Axes, _: Motion) -> None:
