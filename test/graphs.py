@@ -17,13 +17,17 @@ from grasp_ros.graph import bag
 from grasp_ros.graph.bag.recorder import Recorder
 from grasp_ros.graph.bag.recording import Recording
 from grasp_ros.graph.processes import Graph
+from grasp_ros.graph.running import Running
 from grasp_ros.scene import Scene
 from lab.drills.recorder import Tick
 
 
-def written(path: Path, scene: Scene, ticks: Iterable[Tick], counters: Mapping[str, object] | None = None) -> Path:
-    """A new bag of some ticks, closed with counters of what was lost."""
-    recorder = Recorder(path, scene, {"python": "3"})
+def written(
+    path: Path, scene: Scene, ticks: Iterable[Tick], counters: Mapping[str, object] | None = None,
+    running: Running | None = None,
+) -> Path:
+    """A new bag of some ticks, closed with counters of what was lost; by default of a run in lockstep."""
+    recorder = Recorder(path, scene, {"python": "3"}, running=running or Running())
     for tick in ticks:
         recorder.write_tick(*tick)
     recorder.close(counters)

@@ -68,7 +68,7 @@ def _recover(options: argparse.Namespace) -> int:
     found = recover(options.bag, new)
     for words in found.left_out:
         print(f"left out: {words}")
-    missing = f"; missing are {found.missing}" if found.missing else ""
+    missing = f"; without the ticks {found.missing}" if found.missing else ""
     print(f"{found.ticks} ticks written to {new}{missing}")
     return 0
 

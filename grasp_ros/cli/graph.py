@@ -11,7 +11,6 @@ import signal
 import sys
 import time
 from collections.abc import Sequence
-from contextlib import suppress
 from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
@@ -120,6 +119,7 @@ def _run(options: argparse.Namespace) -> int:
     if not kernels_on_disk():  # otherwise the plant alone loads them
         prepare()
         spent.append((time.monotonic(), "compilation"))
+    first = not directory.parent.exists()
     graph = Graph(
         scene, directory, options.accuracy, progress=True, without=options.without, laws=laws,
         plant=plant, one_process=options.one_process, namespace=options.namespace,
@@ -135,9 +135,8 @@ def _run(options: argparse.Namespace) -> int:
     except Refused:
         if graph.processes and _is_without_ticks(graph.bag):  # a node refused what it was given
             shutil.rmtree(directory, ignore_errors=True)
-            if options.output is None:
-                with suppress(OSError):  # there are other runs
-                    directory.parent.rmdir()
+            if first:
+                directory.parent.rmdir()
         raise
     print("grasp: interrupted before the first tick", file=sys.stderr)
     return 130

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from contextlib import chdir
+import os
 from typing import Any
 
 import numpy as np
@@ -65,19 +65,21 @@ def _simulate(options: argparse.Namespace) -> int:
     from grasp_ros.simulation.summary import summary
 
     scene = load_scene(options.scene, options.settings)
+    here = os.open(".", os.O_RDONLY)
     setting, controllers = _setting(options), load_controllers(options.controllers)
     sampled = options.sampled or bool(controllers)
     check_memory(scene, sampled, options.grid)
     check_output(options.output, (".npz", ".csv"), options.force, [options.scene])
     grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
     prepare()
-    with chdir("."), bar(scene.duration, "s", scene.name) as progress:  # a law may go elsewhere
+    with bar(scene.duration, "s", scene.name) as progress:
         trajectory = simulate(
             scene, grid=grid, sampled=sampled, controllers=controllers, method=options.method, setting=setting,
             max_events=options.max_events, max_work=options.max_work,
             sensitivity=options.sensitivity or None,
             progress=None if METHODS[options.method].knob == STEP else progress,
         )
+    os.fchdir(here)  # a law may have called os.chdir
     found = summary(trajectory)
     rows = describe_trajectory(trajectory, found)
     rates = trajectory.sensitivity

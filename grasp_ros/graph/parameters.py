@@ -10,6 +10,8 @@ from grasp_ros.physics.errors import Refused
 
 PEER_SECONDS, START_SECONDS = 1.5, 60.0  # without a sign of life of a node, and until it comes
 Settings = dict[str, tuple[bool | float | str, str]]  # default and meaning by name
+TIMEOUT = "simulated time since the state that the last command answers, after which it is too old"
+ON_TIMEOUT = "what then acts: hold, zero or stop"
 PEERS: Settings = {
     "peer_timeout_s": (PEER_SECONDS, "wall time without a sign of life or an answer"),
     "start_timeout_s": (START_SECONDS, "wall time for peers to come and to answer first; 0: any"),
@@ -21,10 +23,9 @@ MONITORED: Settings = {
 FREE: Settings = {  # exist with the wall clock
     "real_time_factor": (1.0, "simulated seconds in a second"),
     "wait_for_controllers": (False, "start only when somebody sends the commands of each controller"),
+    "left_timeout_s": (0.1, TIMEOUT), "left_on_timeout": ("zero", ON_TIMEOUT),
+    "right_timeout_s": (0.1, TIMEOUT), "right_on_timeout": ("zero", ON_TIMEOUT),
 }
-for side in ("left", "right"):
-    FREE[f"{side}_timeout_s"] = 0.1, "simulated time without a newer command after which another force acts"
-    FREE[f"{side}_on_timeout"] = "zero", "what then acts: hold, zero or stop"
 PLANT: Settings = {
     "scene": ("case_01", "name of a scene of the package, or path of a .yaml file"),
     "accuracy": (ACCURACY, "relative size of the first neglected term of a contact"), **MONITORED,

@@ -183,7 +183,7 @@ class Graph:
         if not received:
             self._check()
             if self.begun is not None and not self.bag.exists():
-                raise GraphError(f"{self.bag}: was removed")
+                raise GraphError(f"{self.bag}: was moved or removed")
             if not (self.bag / "metadata.yaml").exists():  # a law can end its process, and all nodes with it
                 raise GraphError(f"{awaited[0]}: ended with exit status 0 before the run was over")
 

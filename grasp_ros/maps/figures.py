@@ -53,10 +53,7 @@ def heat(axes: Axes, plan: Plan, values: np.ndarray, label: str) -> None:
 
 def edges(axis: Axis) -> np.ndarray:
     """Between which the pixels lie (n + 1,): halfway between the values, and as far beyond the first and the last."""
-    at = np.log(axis.values) if axis.log else axis.values
-    step = np.diff(at)
-    edges = np.concatenate([at[:1] - 0.5 * step[:1], at[:-1] + 0.5 * step, at[-1:] + 0.5 * step[-1:]])
-    return np.exp(edges) if axis.log else edges
+    return axis.at((np.arange(axis.points + 1) - 0.5) / (axis.points - 1))
 
 
 def _norm(shown: Any) -> Normalize:

@@ -24,7 +24,7 @@ from grasp_ros.observe.record import Seen, SegmentRecord
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, U, V, X
 
 NODES, WEIGHTS = (0.5 * (np.polynomial.legendre.leggauss(16)[0] + 1.0), 0.5 * np.polynomial.legendre.leggauss(16)[1])
-DAMPED = 1e-3  # of m/c: what a damper takes in a shorter time is lost among the roundings of the energy at both ends
+DAMPED = 1e-3  # of m/c: in a shorter time a damper takes so little of the energy that three digits and more are lost
 SWUNG = 6.0  # rad, up to which the quadrature follows v^2 to rounding
 
 
@@ -43,12 +43,13 @@ def add_damping(segment: SegmentRecord, seen: Array, body: Body, squares: float)
 def flight_squares(segment: SegmentRecord, body: Body) -> float:
     """Integral of v^2 over a flight, m^2/s."""
     row, lane = segment.m.bodies[body], velocity_lane(body)
-    x, v, x_end, v_end = segment.m.before[lane - 1], segment.m.before[lane], segment.m.y[lane - 1], segment.m.y[lane]
+    x, v = segment.m.before[lane - 1], segment.m.before[lane]
     if row[Of.MASS] == math.inf:  # an object that sticks
         return 0.0
     if abs(row[Of.DAMPING]) * segment.t > DAMPED * row[Of.MASS]:
         before = own_energy(row[Of.MASS], row[Of.STIFFNESS], row[Of.FORCE], x, v, 0.0)[0]
-        after = own_energy(row[Of.MASS], row[Of.STIFFNESS], row[Of.FORCE], x_end, v_end, 0.0)[0]
+        x, v = segment.m.y[lane - 1], segment.m.y[lane]
+        after = own_energy(row[Of.MASS], row[Of.STIFFNESS], row[Of.FORCE], x, v, 0.0)[0]
         return 0.5 * (before - after) / row[Of.DAMPING]
     flight = launch(row, x, v)
     if flight.rate * segment.t > SWUNG:
@@ -61,7 +62,7 @@ def flight_squares(segment: SegmentRecord, body: Body) -> float:
 
 @kernel
 def swing_squares(flight: Flight, t: float) -> float:
-    """The same of an oscillation, v = exp(-sigma t) (a cos + b sin), in closed form."""
+    """Integral of v^2, m^2/s, of an oscillation, v = exp(-sigma t) (a cos + b sin), in closed form."""
     a, b, p, turn = flight.v, (flight.push - flight.sigma * flight.v) / flight.rate, 2.0 * flight.sigma, flight.rate * t
     decay, q = math.exp(-p * t), 2.0 * flight.rate
     cosine, sine = decay * math.cos(2.0 * turn), decay * math.sin(2.0 * turn)

@@ -59,7 +59,7 @@ class Seen(IntEnum):
     OUTSIDE = 32  # of each body: last time outside the bound, s; inf: when the last segment ended
     BOUND = 35  # m
     SETTLED = 36  # time from which on no body leaves the bound, s; inf: not within the run; nan: V_c cannot tell
-    LAST_OUTSIDE = 37  # OUTSIDE at the end of the run; a run that goes on until it settles keeps it
+    LAST_OUTSIDE = 37  # OUTSIDE of each body at the end of the run, s; a run that goes on until it settles keeps it
 
 
 SEEN = Seen.LAST_OUTSIDE + 3

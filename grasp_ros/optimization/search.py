@@ -27,7 +27,7 @@ from grasp_ros.simulation.progress import Told, showing
 MEMBERS, GENERATIONS = 16, 500  # members of a population for each free number; generations at most
 AGREE = 1e-14  # standard deviation of what a population reaches, relative, at which a search ends
 BESIDE = 0.01  # part of a range, from whose end a choice is so far that it is tried, too
-NEAR, PLATEAU = 1e-5, 50  # parts of the ranges within which it then is; generations for which it goes on elsewhere
+NEAR, PLATEAU = 1e-5, 50  # part of the ranges in which a population that agrees must lie, or for how many generations
 FRONT = 12  # choices along two outcomes
 BROKEN, NOTHING = 1e100, 1e140  # above every outcome: a bound is broken; there is no outcome; squares are finite
 
@@ -119,7 +119,8 @@ def search(problem: DesignProblem, seed: int = 0, progress: Told | None = None) 
         nonlocal agreed
         reached, places = intermediate_result.population_energies, intermediate_result.population
         agreed = agreed + 1 if np.std(reached) <= AGREE * abs(np.mean(reached)) else 0
-        return agreed > (0 if np.ptp(places, axis=0).max() <= NEAR else PLATEAU)
+        done = np.ptp(places, axis=0).max() <= NEAR or reached.min() >= NOTHING
+        return bool(agreed > (0 if done else PLATEAU))
 
     found = differential_evolution(
         function, [(0.0, 1.0)] * len(problem.axes), popsize=MEMBERS, maxiter=GENERATIONS, tol=0.0, atol=-1.0, rng=seed,
@@ -142,7 +143,7 @@ def _with_ends(place: Array) -> Array:
     """A place (k,), and others (n, k) with numbers at the ends of ranges: a population may stop just before one."""
     ends = np.where(np.abs(place - np.rint(place)) < BESIDE, np.rint(place), place)
     single = np.where(np.eye(len(place), dtype=bool), ends, place)
-    return np.vstack([place, ends, single])
+    return np.unique(np.vstack([place, ends, single]), axis=0)
 
 
 def costs(problem: DesignProblem, parts: Array) -> Array:

@@ -79,6 +79,13 @@ LYAPUNOV_VALUES = {
 LYAPUNOV_NAMES = [*LYAPUNOV_VALUES]
 
 
+def timing_names(sides: Iterable[str]) -> list[str]:
+    """Names of what `timing` carries, in their order, see `free_running.Timing`."""
+    return ["period_s", "jitter_s", "late_p99_s", "overruns", "lost_s", "reached", *(
+        f"{side}_{name}" for side in sides
+        for name in ("age_p99", "age_max", "age_p99_all", "age_max_all", "timed_out_all"))]
+
+
 def named(values: Iterable[float]) -> dict[str, float]:
     """What `lyapunov` carries, by name."""
     return dict(zip(LYAPUNOV_NAMES, (float(value) for value in values), strict=True))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import textwrap
 from base64 import b64encode
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from html import escape
 from io import BytesIO
@@ -113,7 +113,7 @@ def compose(
                     axes.set_ylabel(panel.label)
             grid[-1, column].set_xlabel("time, s")
         for row in grid:
-            legend_beside(row[-1], row)
+            legend_beside(*row)
         figure.align_ylabels(grid[:, 0])
         figure.canvas.draw()  # the layout, with the letters of this context
         return figure
@@ -140,13 +140,13 @@ def _title(motion: Motion, caption: str, width_mm: float, small: bool) -> str:
     return "\n".join(textwrap.fill(text, letters) for text in (title, caption))
 
 
-def legend_beside(axes: Axes, row: Iterable[Axes] | None = None) -> None:
-    """A legend of all axes in a row to the right of these, the last ones, where it hides nothing."""
-    every = [own.get_legend_handles_labels() for own in ([axes] if row is None else row)]
+def legend_beside(*row: Axes) -> None:
+    """A legend of all axes in a row, to the right of them, where it hides nothing."""
+    every = [own.get_legend_handles_labels() for own in row]
     lines = {label: line for own in every for line, label in zip(*own, strict=True)}
     if lines:
-        axes.legend(lines.values(), lines.keys(), loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0,
-                    fontsize="small", frameon=False)
+        row[-1].legend(lines.values(), lines.keys(), loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0,
+                       fontsize="small", frameon=False)
 
 
 def displacements(axes: Axes, motion: Motion) -> None:

@@ -79,8 +79,8 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
         found["last_outside_s"] = _by_body(run, last_outside_of(known, row))
     if row is None:
         found["largest_of"] = OUTPUTS if dense is None else TICKS
-        acted = np.nan_to_num(np.abs(known.inputs[:, [LEFT, RIGHT]]))  # nan: from the end on nothing acts
-        largest = [*acted.max(axis=0).tolist(), *known.impacts.max(axis=0).tolist()]
+        acted = np.fmax.reduce(np.abs(known.inputs[:, [LEFT, RIGHT]]), initial=0.0)  # nan: nothing acts from the end on
+        largest = [*acted.tolist(), *known.impacts.max(axis=0).tolist()]
     else:
         found["largest_of"], largest = MOTION, [row[name] for name in PEAKS]
     found["largest_N"] = dict(zip(FORCES, largest, strict=True))

@@ -214,9 +214,9 @@ os.chdir("away")
 own = open("mine", "w")
 fcntl.flock(own, fcntl.LOCK_EX | fcntl.LOCK_NB)  # which one process can have
 def law(tick, t, x, v):
-    if tick == 50:
+    if tick >= 50:  # of a free run it does not see each
         os.chdir("/")
-    if tick == 500:
+    if tick >= 500:
         time.sleep(3600.0)
     return -5.0 * x - 0.5 * v
 """

@@ -44,7 +44,6 @@ def test_outcomes_are_those_of_a_simulation_and_bounds_are_kept() -> None:
         found.runs = 1  # type: ignore[misc]
 
 
-@pytest.mark.slow
 def test_a_search_does_not_end_where_many_choices_are_alike() -> None:
     """Of most gains nothing touches, and the object stays; half of the seeds ended there."""
     bounds = {"touches": 2.0}
@@ -66,6 +65,7 @@ def test_a_body_that_is_not_there_has_no_part_in_a_group() -> None:
     assert group.outcomes["settling_times"] == pytest.approx(alone.outcomes["settling_time"], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_no_choice_along_two_outcomes_is_better_in_both(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("grasp_ros.optimization.search.FRONT", 4)
     scene = gr.load("case_01", ["left_feedback.velocity_gain_Ns_per_m=7", "right_feedback.velocity_gain_Ns_per_m=7"])

@@ -1,6 +1,11 @@
 """Bags: written, read, verified, recovered, and told in a few numbers."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from grasp_ros.graph.bag.reading import BagError as BagError
+    from grasp_ros.graph.bag.reading import Recording as Recording
+    from grasp_ros.graph.bag.reading import read as read
 
 
 def __getattr__(name: str) -> Any:

@@ -20,7 +20,7 @@ import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph.bag.opening import UNREADABLE, Opened, decoding_bag
-from grasp_ros.graph.bag.recorder import BESIDE, LOST_RECORD, Recorder, checksum
+from grasp_ros.graph.bag.recorder import BESIDE, LOST_RECORD, checksum
 from grasp_ros.graph.bag.recording import Recording, acted_from
 from grasp_ros.graph.bag.rosbag2 import BagError, EmptyBagError, decode
 from grasp_ros.graph.bag.storage import Storage, Stored
@@ -30,9 +30,9 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import read_text
-from grasp_ros.scene.topics import CHANGES, CLOCK, FORCE, JOINT_STATES, LYAPUNOV, TIMING, Numbers, Topic
+from grasp_ros.scene.topics import CHANGES, CLOCK, FORCE, JOINT_STATES, LYAPUNOV, TIMING, Numbers, Topic, timing_names
 
-__all__ = ["BagError", "Recorder", "Recording", "read"]
+__all__ = ["BagError", "Recording", "read"]
 MOST_NS = 2**63 - 1
 NOT_FINITE, PUSHED = "a number is not finite", "an effort of the object; allowed: 0"
 NOT_NEXT = "its stamp is not the next one of the scene"
@@ -48,12 +48,13 @@ def read(path: str | os.PathLike[str]) -> Recording:
     """
     opened = Opened(path)
     with decoding_bag(opened.path):
-        scene, changes, timing = opened.scene, Changes(), list[Any]()
+        scene, changes, timing = opened.scene, Changes(), list[Sequence[float]]()
+        quality = () if opened.running.lockstep else timing_names(NAMES[body] for body in scene.system.laws)
         columns = columns_of(opened)
         takers: dict[Topic, Callable[[Stored], object]] = {
             **{topic: column.add for topic, column in columns.items()},
             **{topic: partial(changes.add, topic, scene) for topic in CHANGES.values()},
-            TIMING: lambda stored: timing.extend(_of_a_plant(stored)),
+            TIMING: lambda stored: timing.extend(_of_a_plant(quality, stored)),
         }
         counts = dict.fromkeys(opened.names, 0)
         for topic, stored in opened.messages:
@@ -63,7 +64,8 @@ def read(path: str | os.PathLike[str]) -> Recording:
         if not columns[JOINT_STATES].times:
             raise EmptyBagError(f"{opened.path}: holds no tick")
         _check_metadata(opened.path, opened.storage)
-        return _recording(opened, columns, changes, {topic.name: count for topic, count in counts.items()}, timing)
+        table = dict(zip(quality, np.array(timing).T, strict=True)) if timing else {}
+        return _recording(opened, columns, changes, {topic.name: count for topic, count in counts.items()}, table)
 
 
 def columns_of(opened: Opened) -> dict[Topic, Columns]:
@@ -111,7 +113,8 @@ def _check_metadata(path: Path, storage: Storage) -> None:
 
 
 def _recording(
-    opened: Opened, columns: Mapping[Topic, Columns], changes: Changes, counts: dict[str, int], timing: Sequence[Any]
+    opened: Opened, columns: Mapping[Topic, Columns], changes: Changes, counts: dict[str, int],
+    timing: dict[str, Array],
 ) -> Recording:
     """All of it, as arrays."""
     scene, states = opened.scene, columns[JOINT_STATES]
@@ -137,7 +140,7 @@ def _recording(
     return Recording(
         opened.path, scene, opened.versions, counts, ticks, state, effort, command,
         {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
-        dict(changes), opened.running, ticks[stamps == 0], _lost(opened.storage), _table(timing),
+        dict(changes), opened.running, ticks[stamps == 0], _lost(opened.storage), timing,
         dict(+changes.unheard),
     )
 
@@ -230,22 +233,12 @@ class Changes(dict[int, dict[str, float]]):
             self._now.update(new)
 
 
-def _of_a_plant(stored: Stored) -> Iterator[Any]:
-    """A message on `timing`, unless somebody else has sent it: anybody may."""
+def _of_a_plant(known: Sequence[str], stored: Stored) -> Iterator[Sequence[float]]:
+    """The numbers of a message on `timing`, unless somebody else has sent it: anybody may."""
     with suppress(*UNREADABLE):
         message = decode(TIMING, stored.cdr)
-        whole = len(message.name) == len(message.position) and np.isfinite(message.position).all()
-        if whole and {"reached", "overruns", "lost_s"} <= {*message.name}:  # see `free_running.Timing`
-            yield message
-
-
-def _table(messages: Sequence[Any]) -> dict[str, Array]:
-    """Lists of numbers with names as columns; those that have not the names of the last one are left out."""
-    if not messages:
-        return {}
-    names = messages[-1].name
-    columns = np.array([message.position for message in messages if message.name == names]).T
-    return dict(zip(names, columns, strict=True))
+        if [*known] == message.name and len(known) == len(message.position) and np.isfinite(message.position).all():
+            yield message.position
 
 
 def _lost(storage: Storage) -> dict[str, str]:

@@ -200,6 +200,11 @@ class Recorder:
         if not there.exists() or not os.path.samestat(file, there.stat()):
             raise BagError(f"{self._path}: was moved during the recording, which ends there; `grasp recover` closes it")
 
+    @property
+    def gaps(self) -> str:
+        """Ticks of the scene that were not written so far, "3, 7-9", say."""
+        return ", ".join(f"{first}" if first == last else f"{first}-{last}" for first, last in self._gaps)
+
     def close(self, counters: Mapping[str, object] | None = None) -> None:
         """Finish the bag, with what else was lost or dropped; only now it has its metadata. Nothing the second time.
 
@@ -229,8 +234,7 @@ class Recorder:
         counts = {topic: self._messages.counts[channel] for topic, channel in self._channels.items()}
         document = rosbag2.metadata(f"{self._path.name}.mcap", counts, self._names, self._last_ns, self._custom)
         text = dump(document)
-        gaps = ", ".join(f"{first}" if first == last else f"{first}-{last}" for first, last in self._gaps) or "none"
-        lost = {"end": why, "ticks that are missing": gaps, **counters, BESIDE: checksum(text)}
+        lost = {"end": why, "ticks that are missing": self.gaps or "none", **counters, BESIDE: checksum(text)}
         self._writer.add_metadata(LOST_RECORD, signed(lost))
         self._writer.add_metadata(rosbag2.METADATA_RECORD, {
             rosbag2.METADATA_KEY: dump(document[rosbag2.INFORMATION]).strip()

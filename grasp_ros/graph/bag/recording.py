@@ -151,7 +151,7 @@ class Recording(Tabular, Frozen):
     def simulated(self) -> Trajectory:
         """The motion without ROS, under the forces that the bag has: with events, contacts, sections, any time between.
 
-        Its states are those of the bag, bit for bit, if `verify` holds. Commands are here the forces that acted.
+        Its states are those of the bag, bit for bit, if `verify` holds. Commands are here what acts after the delay.
 
         Raises
         ------
@@ -167,8 +167,12 @@ class Recording(Tabular, Frozen):
         forces = np.vstack([acted[wait:-1], np.zeros((1 + wait, 2))]).T.tolist()  # from the last tick on nothing acts
         laws = {side: partial(_recorded, forces[body]) for side, body in SIDES.items()
                 if body in self.scene.system.laws}
-        scene = self.scene.changed({"time.duration_s": float(self.t[-1])})
-        return simulate(scene, sampled=True, controllers=laws, setting=self.running.accuracy)
+        numbers = {"time.duration_s": float(self.t[-1])}
+        for name, force in ((name, force) for now in self.changes.values() for name, force in now.items()):
+            section, key = name.split(".")
+            if key == "limit_N":  # it was raised: forces may exceed the first one
+                numbers[name] = max(force, numbers.get(name, self.scene.values[section][key]))
+        return simulate(self.scene.changed(numbers), sampled=True, controllers=laws, setting=self.running.accuracy)
 
     @property
     def whole(self) -> bool:
@@ -209,10 +213,17 @@ class Recording(Tabular, Frozen):
 
     @property
     def closed(self) -> bool:
-        """Whether V belongs to laws that were known and ran, wherever a force of a controller acted."""
+        """Whether V belongs to laws that were known and ran, at every tick.
+
+        In a free run they may be announced some ticks after a start, as long as nothing acts.
+        """
         known = self.lyapunov[:, LYAPUNOV_NAMES.index("closed")] == 1.0
+        if self.running.lockstep or not known.any():
+            return bool(known.all())
+        latest = np.maximum.accumulate(np.where(known, np.arange(len(known)), -1))
+        before = latest < np.searchsorted(self.tick, self.tick - self.scene_tick)
         pushed = np.nan_to_num(acted_from(self.tick, self.effort)).any(axis=1) | self.effort.any(axis=1)
-        return bool(known.any() and not (pushed & ~known).any())
+        return bool((known | (before & ~pushed)).all())
 
     @property
     def energy_of(self) -> str:

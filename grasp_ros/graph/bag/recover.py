@@ -23,7 +23,7 @@ class Recovery(NamedTuple):
 
     ticks: int
     left_out: list[str]  # what, and why
-    missing: str  # of the ticks up to the last one; empty if all are there
+    missing: str  # of the ticks up to the last one, "3, 7-9", say; empty if all are there
 
 
 def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recovery:
@@ -42,11 +42,8 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
         reasons = (*(why for _, _, why in opened.storage.left_out), *refused, "it holds no tick")
         raise BagError(f"{path}: nothing can be recovered: {reasons[0]}")
     recorder, written = Recorder(Path(new), opened.scene, opened.versions, opened.names, opened.running), 0
-    number, gap = 0, None  # the first tick that is missing
     try:
         for time_ns, stamp_ns, tick, beside in chain([begin], ticks):
-            number = time_ns // opened.scene.period_ns
-            gap = written if gap is None and number > written else gap
             tick[LYAPUNOV] = tick.pop(LYAPUNOV)  # the last one
             recorder.write_tick(time_ns, tick.items(), stamp_ns)
             for topic, cdr in beside:
@@ -56,8 +53,7 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
         left_out = [f"{size} bytes from byte {offset} on: {why}" for offset, size, why in opened.storage.left_out]
         left_out += [f"something of {len(at)} ticks, the first {at[0]}: {why}" for why, at in refused.items()]
         recorder.close({"recovered from": str(path), "what was left out": "; ".join(left_out) or "none"})
-    missing = "" if gap is None else f"{number + 1 - written} ticks, the first {gap}"
-    return Recovery(written, left_out, missing)
+    return Recovery(written, left_out, recorder.gaps)
 
 
 @contextmanager

@@ -157,16 +157,19 @@ class Storage:
         elif opcode == Opcode.CHANNEL:
             channel = Channel.read(ReadDataStream(BytesIO(body)))
             self._channels[channel.id] = channel
-        return opcode in (Opcode.SCHEMA, Opcode.CHANNEL)
+        else:
+            return False
+        return True
 
     def _read_summary(self) -> None:
-        """Take schemas and channels from the index, which repeats them: their chunk, the first, may be damaged."""
+        """Take schemas and channels from an index, which repeats them: their chunk, the first, may be damaged."""
         with suppress(*DAMAGE):
             footer = self._footer()
-            offset, summary = footer.summary_start, self._data[footer.summary_start : -len(MAGIC) - SUM.size]
-            if zlib.crc32(summary) != footer.summary_crc:
+            offset = footer.summary_start
+            summary = memoryview(self._data)[offset : -len(MAGIC) - SUM.size]
+            if not offset or (footer.summary_crc and zlib.crc32(summary) != footer.summary_crc):
                 return
-            while offset and (end := self._end_of(offset)) is not None:
+            while (end := self._end_of(offset)) is not None:
                 self._defines(self._data[offset], self._data[offset + HEAD.size : end])
                 offset = end
 

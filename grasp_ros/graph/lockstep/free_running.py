@@ -25,7 +25,7 @@ from grasp_ros.graph.serialization import numbers_message, raw_command
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.topics import LYAPUNOV, TIMING, Topic
+from grasp_ros.scene.topics import LYAPUNOV, TIMING, Topic, timing_names
 
 if TYPE_CHECKING:  # it imports this one
     from grasp_ros.graph.nodes.plant import Plant
@@ -49,6 +49,7 @@ class Held:
     # Tick of the state that it answers, from which its age counts; that of its arrival where it carries no stamp.
     answers: int = 0
     late: bool = False  # whether it is older than the timeout
+    ever: bool = False  # whether one has come
 
 
 class FreeRunning:
@@ -56,7 +57,7 @@ class FreeRunning:
 
     def __init__(self, plant: Plant, steering: Steering, running: Running, waits: bool) -> None:
         self._plant, self._steering, self._running, self._awaits = plant, steering, running, waits
-        self.answered = False  # whether a state of this run was
+        self.answered = False  # whether all sides have answered a state of this run
         self.topics: list[Topic] = []  # of which it needs each message
         self._period = plant.scene.period_ns / NANOSECONDS / running.real_time_factor  # s of wall time
         self._timeouts = {
@@ -104,7 +105,8 @@ class FreeRunning:
         elif tick < held.answers:
             plant.count("stale commands")
         elif self._limits.admit(topic, cdr):
-            held.force, held.answers, self.answered = force, tick, True
+            held.force, held.answers, held.ever = force, tick, True
+            self.answered = self.answered or all(own.ever for own in self._held.values())
             self.advance()
 
     def advance(self) -> None:
@@ -116,10 +118,11 @@ class FreeRunning:
             self._held = {side: Held() for side in self._held}
             self._steering.reset_done()
             self._set_anchor()
-        if self._steering.steps:  # asked for: not with the clock
-            while not (plant.finished or plant.outrun()) and self._steering.steps and self._steering.go_on():
+        if self._steering.steps:  # asked for: not with the clock; the timer calls again
+            end = time.monotonic() + BURST_SECONDS
+            while time.monotonic() < end and not (plant.finished or plant.outrun()) and self._steering.go_on():
                 self._step()
-        if self._steering.stands:
+        if self._steering.stands or self._steering.steps:
             self._timing.pause()
             self._set_anchor()
             return
@@ -228,21 +231,21 @@ class Timing:
         """
         if not self._lateness or not self._intervals:
             return {}
-        values = {
-            "period_s": float(np.mean(self._intervals)), "jitter_s": float(np.std(self._intervals)),
-            "late_p99_s": float(np.percentile(self._lateness, PERCENTILE)), "overruns": float(self._overruns),
-            "lost_s": self.lost, "reached": self._factor * self._period * self._counted / self._spent,
-        }
+        values = [
+            float(np.mean(self._intervals)), float(np.std(self._intervals)),
+            float(np.percentile(self._lateness, PERCENTILE)), float(self._overruns), self.lost,
+            self._factor * self._period * self._counted / self._spent,
+        ]
         for side, ages in self._ages.items():
             self._all[side].update(ages)
-            for end, found in (("", ages), ("_all", self._all[side])):
+            for found in (ages, self._all[side]):
                 known, often = [*found], [*found.values()]
-                values[f"{side}_age_p99{end}"] = float(  # the smallest that PERCENTILE of them do not exceed
+                values.append(float(  # the smallest that PERCENTILE of them do not exceed
                     np.percentile(known, PERCENTILE, weights=often, method="inverted_cdf")
-                )
-                values[f"{side}_age_max{end}"] = float(max(known))
-            values[f"{side}_timed_out_all"] = float(self._timed_out[side])
+                ))
+                values.append(float(max(known)))
+            values.append(float(self._timed_out[side]))
             ages.clear()
         self._intervals.clear()
         self._lateness.clear()
-        return values
+        return dict(zip(timing_names(self._ages), values, strict=True))

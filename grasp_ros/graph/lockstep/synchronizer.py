@@ -95,6 +95,10 @@ class Synchronizer:
             return Arrival.REPEATED if self._states else Arrival.AGAIN
         if 0 < stamp < self._newest:
             return Arrival.STAMP
+        if self._newest < 0:  # what came before it may have had any stamp
+            for topic, queue in self._others.items():
+                near = {other: known for other, known in queue.items() if other <= stamp + self._ahead_ns}
+                self._others[topic] = near
         self._states.append((stamp < self._newest, self._reader.read(cdr), cdr))
         self._newest = stamp
         return Arrival.TAKEN

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections import Counter
 from typing import Any
 
 from grasp_ros.graph.bag.opening import Opened
@@ -13,7 +12,7 @@ from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.topics import WINDOW, Topic
+from grasp_ros.scene.topics import WINDOW
 
 # For readers to be found, and at most for the first to come and all to be connected: who missed the announcements at
 # the start hears of this node again after 3 s.
@@ -38,7 +37,6 @@ class Player(GraspNode):
         self._outputs = {topic: self.create_publisher(messages.TYPES[topic.type], name, messages.qos(topic))
                          for topic, name in bag.names.items()}
         self.counters["messages"] = 0
-        self._sent: Counter[Topic] = Counter()
         self._created, self._begin = time.monotonic(), math.nan
         self.when(self._ready, self._start)
 
@@ -60,9 +58,8 @@ class Player(GraspNode):
             topic, stored = self._next
             self._outputs[topic].publish(stored.cdr)
             self.count("messages")
-            self._sent[topic] += 1
-            if self._sent[topic] % WINDOW == 0:  # readers may be slower than it
-                self.flush(self._outputs[topic])
+            if self.counters["messages"] % WINDOW == 0:  # readers may be slower than it
+                self.flush(*self._outputs.values())
             following = next(self._rows, None)
             if following is None:
                 self.finished = True
