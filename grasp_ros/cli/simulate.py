@@ -80,6 +80,7 @@ def _simulate(options: argparse.Namespace) -> int:
             progress=None if METHODS[options.method].knob == STEP else progress,
         )
     os.fchdir(here)  # a law may have called os.chdir
+    os.close(here)
     found = summary(trajectory)
     rows = describe_trajectory(trajectory, found)
     rates = trajectory.sensitivity
