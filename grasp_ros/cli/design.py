@@ -47,7 +47,7 @@ def _design(options: argparse.Namespace) -> int:
     scene = load_scene(options.scene, options.settings)
     setup = Setup(accuracy=options.accuracy, sampled=options.sampled)
     problem = DesignProblem(scene, [read_axis("--free", text, grid=False) for text in options.free], options.minimise,
-                      [read_bound(text) for text in options.bounds], setup)
+                            [read_bound(text) for text in options.bounds], setup)
     check_output(options.output, YAML, options.force, [options.scene])
     check_output(options.figure, figure_endings(options.figure), options.force, [options.scene])
     several = len(options.minimise) == 2

@@ -21,6 +21,7 @@ from grasp_ros.cli.bags import add_limits, check_limits, keeps
 from grasp_ros.cli.checks import load_scene, prepare
 from grasp_ros.cli.controllers import sides_of
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
+from grasp_ros.graph.bag.errors import BagError, EmptyBagError
 from grasp_ros.graph.host import check_reach, hold, network
 from grasp_ros.graph.parameters import PEER_SECONDS, quoted
 from grasp_ros.graph.processes import Graph, GraphError, become
@@ -103,8 +104,6 @@ def _reach(options: argparse.Namespace) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from grasp_ros.graph.bag.rosbag2 import BagError
-
     _reach(options)
     laws = {f"{side}_controller": place for side, place in sides_of(options.laws).items()}
     scene = load_scene(options.scene, options.settings)
@@ -159,8 +158,6 @@ def _has_ticks(path: Path) -> bool:
 
 def _is_without_ticks(bag: Path) -> bool:
     """Whether there is nothing to keep; a bag that cannot be read may have ticks."""
-    from grasp_ros.graph.bag.rosbag2 import EmptyBagError
-
     try:
         return not _has_ticks(bag)
     except Refused as error:

@@ -19,10 +19,11 @@ from typing import Any
 import numpy as np
 
 from grasp_ros import scene as scenes
+from grasp_ros.graph.bag.errors import BagError, EmptyBagError
 from grasp_ros.graph.bag.opening import UNREADABLE, Opened, decoding_bag
 from grasp_ros.graph.bag.recorder import BESIDE, LOST_RECORD, checksum
 from grasp_ros.graph.bag.recording import Recording, acted_from
-from grasp_ros.graph.bag.rosbag2 import BagError, EmptyBagError, decode
+from grasp_ros.graph.bag.rosbag2 import decode
 from grasp_ros.graph.bag.storage import Storage, Stored
 from grasp_ros.graph.serialization import clock_template, force_template, lyapunov_template, state_template
 from grasp_ros.physics.layout import OBJECT

@@ -9,10 +9,10 @@ from itertools import chain, groupby
 from pathlib import Path
 from typing import NamedTuple
 
+from grasp_ros.graph.bag.errors import BagError
 from grasp_ros.graph.bag.opening import UNREADABLE, Opened
 from grasp_ros.graph.bag.reading import MOST_NS, NOT_NEXT, Changes, columns_of, follows, stamp_of
 from grasp_ros.graph.bag.recorder import Recorder
-from grasp_ros.graph.bag.rosbag2 import BagError
 from grasp_ros.scene.topics import CHANGES, CLOCK, LYAPUNOV, RUN, SCENE, Topic
 
 MOST_REASONS = 20  # that are told apart

@@ -8,7 +8,6 @@ from typing import Any
 
 from rosbags.typesys import Stores, get_typestore
 
-from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import CHANGES, CLOCK, DIAGNOSTICS, RUN, SCENE, TIMING, Topic
 
@@ -19,14 +18,6 @@ TOPIC = "topic "  # how the keys of topics' full names begin
 INFORMATION = "rosbag2_bagfile_information"
 _TYPES = get_typestore(Stores.ROS2_JAZZY)
 _NO_LIMIT = {"sec": 9223372036, "nsec": 854775807}  # what Fast DDS reports for an infinite duration
-
-
-class BagError(Refused):
-    """A bag that cannot be written or read: names the path and the reason."""
-
-
-class EmptyBagError(BagError):
-    """A bag without a tick."""
 
 
 def topics_of(scene: Scene) -> list[Topic]:

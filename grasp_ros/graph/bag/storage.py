@@ -22,8 +22,9 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Footer, Header, Metadata, Schema
 
 from grasp_ros.graph.bag.chunks import HEAD
+from grasp_ros.graph.bag.errors import BagError
 from grasp_ros.graph.bag.recorder import DIGEST, LOST_RECORD, OWN_RECORD, signed
-from grasp_ros.graph.bag.rosbag2 import PROFILE, BagError
+from grasp_ros.graph.bag.rosbag2 import PROFILE
 
 MAGIC = b"\x89MCAP0\r\n"
 MESSAGE = struct.Struct("<H4xQ8x")  # channel and time of a message; the library's reader takes ten times as long

@@ -145,7 +145,7 @@ class FreeRunning:
                 return
             self._timing.period(now, now - due)
             self._step()
-        if time.monotonic() > begin + 2.0 * BURST_SECONDS:
+        if time.monotonic() > begin + 2.0 * BURST_SECONDS:  # the timer is due again, before all else
             self._turn = time.monotonic() + TURN_SECONDS
 
     def _waits(self, now: float) -> bool:

@@ -6,8 +6,8 @@ import math
 import time
 from typing import Any
 
+from grasp_ros.graph.bag.errors import EmptyBagError
 from grasp_ros.graph.bag.opening import Opened
-from grasp_ros.graph.bag.rosbag2 import BagError
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.physics.errors import Refused
@@ -32,7 +32,7 @@ class Player(GraspNode):
         self._rows = bag.messages
         first = next(self._rows, None)
         if first is None:
-            raise BagError(f"{bag.path}: holds no tick")
+            raise EmptyBagError(f"{bag.path}: holds no tick")
         self._next, self._first_ns = first, first[1].time_ns
         self._outputs = {topic: self.create_publisher(messages.TYPES[topic.type], name, messages.qos(topic))
                          for topic, name in bag.names.items()}
