@@ -26,7 +26,7 @@ LOG_FROM = 1e3  # ratio of values from which on colours are those of their logar
 def draw(data: Any, plan: Plan, outcome: str, path: Path) -> None:
     """Draw one outcome: a heat map over two axes, a curve over one, a histogram and scatter of a sample."""
     values = np.asarray(data[outcome].values)
-    label = ", ".join([outcome.replace("_", " "), data[outcome].attrs["units"]]).removesuffix(", 1")
+    label = canvas.label(outcome, data[outcome].attrs["units"])
     if plan.sample:
         _sample(data, plan, values, label, path)
         return

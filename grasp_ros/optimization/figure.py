@@ -32,7 +32,7 @@ def around(problem: DesignProblem, choice: Design) -> Figure:
         axes.plot(choice.numbers[axis.keys[0]], choice.outcomes[name], "o", color=CHOSEN)
         axes.set_xlabel("\n".join(axis.keys), fontsize="small")
         axes.set_xscale("log" if axis.log else "linear")
-    row[0][0].set_ylabel(label(problem, name))
+    row[0][0].set_ylabel(canvas.label(name, problem.units[name]))
     figure.suptitle(problem.scene.title, fontsize="medium")
     return figure
 
@@ -45,12 +45,8 @@ def tradeoff(problem: DesignProblem, choices: Sequence[Design]) -> Figure:
     x, y = ([own.outcomes[name] for own in choices] for name in (first, second))
     axes.plot(x, y, "o-", color=CHOSEN, drawstyle="steps-post", linewidth=0.8)
     scales = ["log" if max(values) > LOG_FROM * min(values) > 0.0 else "linear" for values in (x, y)]
-    axes.set(xlabel=label(problem, first), ylabel=label(problem, second), xscale=scales[0], yscale=scales[1])
+    xlabel, ylabel = (canvas.label(name, problem.units[name]) for name in (first, second))
+    axes.set(xlabel=xlabel, ylabel=ylabel, xscale=scales[0], yscale=scales[1])
     axes.set_title(problem.scene.title, fontsize="medium")
     axes.grid(alpha=0.3)
     return figure
-
-
-def label(problem: DesignProblem, name: str) -> str:
-    """An outcome with its unit."""
-    return f"{name.replace('_', ' ')}, {problem.units[name]}"

@@ -46,6 +46,11 @@ def style(own: Mapping[str, Any] | None = None) -> Iterator[None]:
         yield
 
 
+def label(name: str, unit: str) -> str:
+    """An outcome with its unit."""
+    return ", ".join([name.replace("_", " "), unit]).removesuffix(", 1")
+
+
 def formats() -> list[str]:
     """Endings of the files that can be written."""
     return sorted(f".{name}" for name in FigureCanvasAgg.get_supported_filetypes())

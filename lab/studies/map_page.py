@@ -10,6 +10,7 @@ import numpy as np
 from grasp_ros.maps import figures
 from grasp_ros.maps.plan import Plan
 from grasp_ros.scene.files import writing
+from grasp_ros.simulation import canvas
 from lab.studies import map_figures, maps, pages
 
 STRONGEST = 4
@@ -69,7 +70,7 @@ def _sample(plan: Plan, data: Any, seconds: float) -> dict[str, Any]:
     for name in OUTCOMES:
         column = data[name]
         found = np.quantile(column.values[np.isfinite(column.values)], (0.0, 0.05, 0.5, 0.95, 1.0))
-        rows.append((f"{name.replace('_', ' ')}, {column.attrs['units']}", *(f"{number:.4g}" for number in found)))
+        rows.append((canvas.label(name, column.attrs["units"]), *(f"{number:.4g}" for number in found)))
     return {
         "runs": len(values), "axes": len(plan.axes), "off": maps.OFF, "done": int((data["status"].values == 0).sum()),
         "settled": len(settling) / len(values), "within": plan.setup.horizons * plan.scene.duration,
