@@ -74,6 +74,11 @@ def _map(options: argparse.Namespace) -> int:
                   options.max_work)
     plan = Plan(scene, setup, axes, options.sample, options.seed)
     check(plan)
+    pictures = {outcome.name: options.output.with_name(f"{options.output.stem}_{outcome.name}.png")
+                for outcome in find(outcomes)}
+    for path in pictures.values():
+        if path.exists() and not options.output.exists():
+            raise Refused(f"{path}: already exists; allowed: an output whose figures beside it are new")
     prepare()
     with bar(plan.rows, "run", scene.name) as progress:
         run(plan, options.output, workers=options.workers, scheduler=options.scheduler, progress=progress)
@@ -87,8 +92,7 @@ def _map(options: argparse.Namespace) -> int:
         if outcome.wanted & Wanted.SETTLING and np.isnan(data[outcome.name].values[done]).any():
             note(f"{outcome.name} is nan where V_c proves nothing; {scene.certificate_in_words(setup.sampled)};"
                  " --outcome last_outside says how long a mass was outside")
-    for column in store.columns_of(data):
-        path = options.output.with_name(f"{options.output.stem}_{column}.png")
+    for column, path in pictures.items():
         figures.draw(data, plan, column, path)
         note(f"written to {path}")
     note(f"written to {options.output}")

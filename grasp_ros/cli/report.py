@@ -71,7 +71,7 @@ def _amounts(found: dict[str, Any]) -> list[Row]:
         times = found["last_outside_s"].items()
         outside = ", ".join(f"{name} {f'{time:.2f} s' if np.isfinite(time) else 'at the end'}" for name, time in times)
         rows.append((f"last outside {SETTLED:.0%}", f"{outside}; V_c may rise, and does not tell what follows"))
-    largest = [f"{name} {value:.5g} N" for name, value in found["largest_N"].items() if value > 0.0]
+    largest = [f"{name.replace('_', ' ')} {value:.5g} N" for name, value in found["largest_N"].items() if value > 0.0]
     if largest:
         names = {MOTION: "largest forces", TICKS: "largest at ticks", OUTPUTS: "largest at outputs"}
         rows.append((names[found["largest_of"]], ", ".join(largest)))

@@ -119,8 +119,8 @@ class Scene(Frozen):
 
     @property
     def live(self) -> list[str]:
-        """Numbers, as "section.key", that belong to controllers: what they may be given in place of the scene's."""
-        return [*self.numbers_of(*self.controllers)]
+        """Numbers, as "section.key", that controllers may be given in place of the scene's while they run."""
+        return [name for name in self.numbers_of(*self.controllers) if self.parameter(name).live]
 
     def numbers_of(self, *nodes: str) -> dict[str, float]:
         """Numbers by "section.key" that belong to nodes."""

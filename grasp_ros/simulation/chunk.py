@@ -6,7 +6,7 @@ plain one that stops, is driven as `simulate` drives a scene. Both give the same
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import NamedTuple
 
@@ -38,6 +38,7 @@ STATUSES = (Status.DONE.name, REFUSED, *(status.name for status in Status if sta
 TOUCHES = len((LEFT, RIGHT))
 NO_GRID = np.zeros(0)
 NEVER = np.zeros(1, dtype=np.int64)
+Drive = Callable[[Scene, Integrator, bool, Array], Array]  # see `closed_loop.drive`
 LEFT_OUT = -2  # in place of why a row ended
 
 
@@ -97,7 +98,8 @@ def check(scene: Scene, setup: Setup) -> list[Outcome]:
     return columns
 
 
-def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER, in_one_call: bool = True) -> Chunk:
+def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER, in_one_call: bool = True,
+            move: Drive = drive) -> Chunk:
     """Run some rows, one after the other; a `stop` that is not 0 ends it early, with rows left out."""
     columns, n = find(setup.outcomes), variants.rows
     runs = Runs(np.full((n, SEEN), np.nan), np.full((n, 6), np.nan), np.zeros((n, TOUCHES)), np.full(n, np.nan))
@@ -111,7 +113,7 @@ def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER, i
     for i in left.tolist():
         if stop[0]:
             break
-        run = _run(variants.row(i), setup, columns, runs, i)
+        run = _run(variants.row(i), setup, columns, runs, i, move)
         if run.status is not Status.DONE:
             status[i], stops[i] = STATUSES.index(run.status.name), run.stop
     system = variants.scene.system
@@ -146,14 +148,14 @@ def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, whi
     return np.asarray(which[~done])
 
 
-def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome], runs: Runs, i: int) -> Integrator:
-    """One row, driven as `simulate` drives it."""
+def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome], runs: Runs, i: int, move: Drive) -> Integrator:
+    """One row, driven as `simulate` drives it, or by other commands."""
     system, sampled = scene.system, setup.sampled or scene.sampled
     run = Integrator(
         system, continuous=not sampled, accuracy=setup.accuracy, max_events=setup.max_events, max_work=setup.max_work)
     wanted = wanted_by(columns)
     run_observer = watch(run, wanted, setup.settled) if wanted else None
-    drive(scene, run, sampled, NO_GRID)
+    move(scene, run, sampled, NO_GRID)
     touched = run.event_table[run.event_table[:, Entry.KIND] == Transition.TOUCH, Entry.BODY]
     runs.state[i], runs.touches[i] = run.state, [(touched == side).sum() for side in (LEFT, RIGHT)]
     done = run.status is Status.DONE

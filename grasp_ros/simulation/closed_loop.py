@@ -60,14 +60,14 @@ def check_changes(scene: Scene, held: bool, changes: Changes, by_user: Iterable[
         raise Refused("changes: not allowed under continuous feedback; allowed: sampled=True")
     live, replaced = scene.live, tuple(f"{side}_feedback." for side in by_user)
     for tick, numbers in changes.items():
-        at = plain(tick)
-        is_tick = at is not None and 0 <= at <= scene.ticks and at == int(at)
-        where = f"changes: at tick {tick!r}"
+        at, where = plain(tick), f"changes: at tick {tick!r}"
+        if at is None or not (0 <= at <= scene.ticks and at == int(at)):
+            raise Refused(f"{where} is not allowed; allowed: 0 to {scene.ticks}")
         for name in names(where, [*mapping(where, numbers)]):
             if name.startswith(replaced):
                 raise Refused(f"changes: {name} at tick {tick!r}: another controller acts in place of this feedback")
-            if name not in live or not is_tick:
-                raise Refused(f"changes: {name} at tick {tick!r}; allowed: {', '.join(live)} at 0 to {scene.ticks}")
+            if name not in live:
+                raise Refused(f"changes: {name} at tick {tick!r}; allowed: {', '.join(live)}")
 
 
 def drive_sampled(

@@ -19,9 +19,10 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.simulation.chunk import HORIZONS, SETTLED, Setup, compute
+from grasp_ros.simulation.closed_loop import drive
 from grasp_ros.simulation.contacts import intervals, side_of
 from grasp_ros.simulation.outcomes import GROUPS
-from grasp_ros.simulation.repeat import UNLIMITED
+from grasp_ros.simulation.repeat import UNLIMITED, has_commands, with_commands
 from grasp_ros.simulation.trajectory import Trajectory, check_run
 from grasp_ros.simulation.variants import Variants
 
@@ -53,12 +54,15 @@ def last_outside(t: Array, position: Array, distance: float) -> Array:
 def as_row(run: Trajectory, *outcomes: str, horizons: int = HORIZONS) -> dict[str, float] | None:
     """Outcomes of an exact run, those of a row of an ensemble: it is integrated again, and watched.
 
-    None for another method, a run that stopped or had controllers from outside, and where a number was set on the way.
+    Other controllers than the scene's act by their recorded commands. None for another method, a run that stopped, and
+    where such commands were not recorded at every control period.
     """
-    if run.method != EXACT or run.status is not Status.DONE or run.controllers:
+    end = np.array([run.scene.duration])
+    if run.method != EXACT or run.status is not Status.DONE or (run.controllers and not has_commands(run, end)):
         return None
     setup = Setup((*outcomes, "last_state"), run.setting, run.sampled, SETTLED, horizons, UNLIMITED, UNLIMITED)
-    columns = compute(Variants(run.scene, {}), setup, in_one_call=False).columns
+    move = (lambda _, integrator, __, ___: with_commands(run, end, integrator)) if run.controllers else drive
+    columns = compute(Variants(run.scene, {}), setup, in_one_call=False, move=move).columns
     found = {name: float(own[0]) for name, own in columns.items()}
     last = [found[name] for name in GROUPS["last_state"]]
     if run.sampled and not np.array_equal([[run.scene.duration, *last]], np.c_[run.t, run.state][-1:], equal_nan=True):

@@ -53,8 +53,8 @@ def states_at(run: Trajectory, times: Array) -> Array:
         odd = wanted[~((wanted >= 0.0) & (wanted <= end))].flat[0]
         raise Refused(f"time {float(odd)!r} is not allowed; allowed: 0 to {end!r} s")
     grid, place = np.unique(np.concatenate([wanted.ravel(), run.t]), return_inverse=True)
-    recorded = run.sampled and _every_tick(run, grid[-1:])
-    states = _with_commands(run, grid) if recorded else _solved(run, grid)[0].state
+    recorded = has_commands(run, grid[-1:])
+    states = with_commands(run, grid, integrator_of(run)) if recorded else _solved(run, grid)[0].state
     check_same(run, grid, states)
     return np.asarray(states[place[: wanted.size]].reshape(*wanted.shape, 6))
 
@@ -64,7 +64,7 @@ def check_same(run: Trajectory, grid: Array, states: Array, events: Array | None
     same = len(states) == len(grid) and (events is None or np.array_equal(events, run.event_table))
     if not same or not np.array_equal(states[np.searchsorted(grid, run.t)], run.state, equal_nan=True):
         raise Refused(f"{run.scene.name}: the run cannot be repeated here to the last bit; allowed: a run of this"
-                      " machine and these versions, without `changes` between its output times")
+                      " machine and these versions")
 
 
 def at_every_tick(run: Trajectory) -> Trajectory:
@@ -100,19 +100,24 @@ def _solved(run: Trajectory, grid: Array) -> tuple[Solution, LoopRecord | None]:
     return solve(run.scene, grid, run.method, run.setting, run.sampled, UNLIMITED, most)
 
 
+def has_commands(run: Trajectory, last: Array) -> bool:
+    """Whether the command at every control period up to the last of some times was recorded."""
+    return run.sampled and _every_tick(run, last)
+
+
 def _every_tick(run: Trajectory, last: Array) -> bool:
     """Whether the output times hold every control period up to the last of some times."""
     ticks = tick_times(run.scene)[: int(tick_of(run.scene, last).max(initial=0)) + 1]
     return bool(np.isin(ticks, run.t).all())
 
 
-def _with_commands(run: Trajectory, grid: Array) -> Array:
+def with_commands(run: Trajectory, grid: Array, integrator: Integrator) -> Array:
     """States (n, 6) at ascending times under the commands that were recorded; fewer if the run stops."""
     scene, last = run.scene, int(tick_of(run.scene, grid[-1:]).max(initial=0))
     count = min(last + 1, scene.ticks)
     answers = np.zeros((count, 3))
     answers[:, :OBJECT] = run.command[np.searchsorted(run.t, tick_times(scene)[:count])]
-    plant = SampledPlant(scene.system, scene.period_ns, integrator_of(run))
+    plant = SampledPlant(scene.system, scene.period_ns, integrator)
     outputs, _ = outputs_within(grid, np.arange(count + 1), scene.period_ns)
     states = plant.follow(answers, outputs)
     if plant.status is Status.DONE:

@@ -26,6 +26,7 @@ from grasp_ros.simulation.ticks import tick_times
 from grasp_ros.simulation.trajectory import Trajectory
 
 GRID_POINTS = 2001
+CHANGED = "the scene's, with numbers set on the way"  # a controller
 
 
 def simulate(
@@ -64,7 +65,7 @@ def simulate(
         Budget of work, for `exact` alone: flights, Taylor steps, and evaluations of event functions.
     changes : mapping of int to mapping of str to float
         Numbers of the scene by "section.key" that were set while it ran, by the tick from which they act; only for
-        sampled feedback.
+        sampled feedback. The run names such a controller in its `controllers`, as one in place of the scene's.
     controllers : mapping of str to callable
         Controllers in place of the scene's feedback, "left" or "right": from the tick, its time in s, and what the
         sensor of the scene measures of the arm, x in m and v in m/s, to a command in N, which is limited and delayed
@@ -106,9 +107,11 @@ def simulate(
         found, loop = solve(scene, grid, method, setting, sampled, max_events, max_work, changes, by_user, progress)
         if progress is not None and found.status is Status.DONE:
             progress(scene.duration)
+    changed = {name.split("_")[0]: CHANGED for numbers in changes.values() for name in numbers}
+    own = {**changed, **{NAMES[side]: controller.name for side, controller in by_user.items()}}
     run = Trajectory(
         scene, grid[: len(found.state)], found.state, loop, found.event_table, found.work, found.status, method,
-        setting, found.stop, {NAMES[side]: controller.name for side, controller in by_user.items()}, found.at_rest,
+        setting, found.stop, own, found.at_rest,
     )
     if sensitivity is None:
         return run

@@ -24,7 +24,7 @@ from grasp_ros.simulation.trajectory import Trajectory, check_run
 
 MOTION, OUTPUTS, TICKS = "motion", "output times", "control periods"  # what a number is of
 MOST_TICKS = 1_000_000  # for which a run is repeated for the sake of a table
-FORCES = ("f_l", "f_r", "fw_l", "fw_r")
+FORCES = ("input_left", "input_right", "impact_left", "impact_right")  # as in the columns of `tables`
 PEAKS = (*GROUPS["peak_input"], *GROUPS["peak_impact"])  # in the order of FORCES
 
 

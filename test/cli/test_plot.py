@@ -77,7 +77,8 @@ def test_what_is_refused_in_a_line(command: Any, words: tuple[str, ...], text: s
 def test_simulate_prints_settling_forces_and_losses(command: Any) -> None:
     lines = dict(line.split("  ", 1) for line in command("simulate", "case_01").stdout.splitlines())
     assert lines["settled to 2%"].strip() == "left 16.61 s, object 16.69 s, right 18.24 s"
-    assert lines["largest forces"].strip() == "f_l 1.5 N, f_r 2.5 N, fw_l 48.295 N, fw_r 73.669 N"  # outputs: 72.93
+    assert lines["largest forces"].strip() == ("input left 1.5 N, input right 2.5 N, impact left 48.295 N,"
+                                               " impact right 73.669 N")  # outputs: 72.93
     parts = [float(part.split()[-1]) for part in lines["energy lost, J"].split(",")]
     assert sum(parts) == pytest.approx(0.5 * (5.1 - 0.00129), abs=1e-3)
     assert "watch for" in lines

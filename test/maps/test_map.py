@@ -290,6 +290,11 @@ def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureF
     ):
         assert main(["map", "case_01", "--set", SHORT, *words, "-o", str(tmp_path / "new.zarr")]) == 2
         assert answer in capsys.readouterr().err, words
+    picture = tmp_path / "new_touches_left.png"
+    picture.write_text("somebody else's")
+    assert main(["map", "case_01", "--set", SHORT, "--x", f"{GAIN}=1:2:2", "-o", str(tmp_path / "new.zarr")]) == 2
+    assert "new_touches_left.png: already exists" in capsys.readouterr().err
+    assert picture.read_text() == "somebody else's"
 
 
 def test_ranks_of_equal_values_are_equal() -> None:

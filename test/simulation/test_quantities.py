@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
 from grasp_ros import scene as scenes
+from grasp_ros.physics.control import ControlLaw
+from grasp_ros.physics.energy import PLANT_ALONE, energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT, Of, Transition
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -16,7 +19,7 @@ from grasp_ros.simulation.chunk import Setup
 from grasp_ros.simulation.ensemble import ensemble
 from grasp_ros.simulation.losses import losses
 from grasp_ros.simulation.quantities import HORIZONS, contact_intervals, last_outside, settling_times
-from grasp_ros.simulation.summary import summary
+from grasp_ros.simulation.summary import MOTION, summary
 from grasp_ros.simulation.ticks import tick_times
 from lab.paper.figures import running_losses
 
@@ -96,11 +99,9 @@ def test_forces_of_a_run_with_changes_are_its_own() -> None:
     """Those of the scene without the changes once stood in the table, and losses of a run that went on without them."""
     scene, stiff = scenes.load("case_01"), {100: {"left_feedback.position_gain_N_per_m": 200.0}}
     run = simulate(scene, sampled=True, changes=stiff)
-    assert summary(run)["largest_N"]["f_l"] == np.abs(run.command[:, 0]).max() > 50.0
-    early = simulate(scene, sampled=True, changes={3000: stiff[100]}, grid=[0.0, 1.0, 2.0])
-    until = simulate(scene.changed({"time.duration_s": 2.0}), sampled=True)
-    # The first by the trapezoidal rule, the second exactly.
-    assert float(losses(early).dampers) == pytest.approx(float(losses(until).dampers), rel=1e-5)
+    assert summary(run)["largest_N"]["input_left"] == np.abs(run.command[:, 0]).max() > 50.0
+    assert run.energy_of == PLANT_ALONE  # nobody knows V_c of gains that change
+    assert run.energy.V_c.tolist() == energy(scene.system, run.state, feedback=False).V_c.tolist()
 
 
 def test_losses_of_a_run_that_cannot_be_repeated_are_refused() -> None:
@@ -148,9 +149,35 @@ def test_the_largest_force_of_an_arm_has_the_external_one_in_it_however_a_run_is
     law = scene.system.laws[LEFT]
     runs = (simulate(scene, sampled=True),
             simulate(scene, controllers={"left": lambda tick, t, x, v: law.command(tick, x, v)}))
-    largest = [summary(run)["largest_N"]["f_l"] for run in runs]
+    largest = [summary(run)["largest_N"]["input_left"] for run in runs]
     assert largest[0] > 3.0
-    assert largest[1] == pytest.approx(largest[0], rel=1e-3)  # at ticks, and between them
+    assert largest[1] == largest[0]
+
+
+def test_a_run_with_another_controller_is_observed_as_one_with_that_of_the_scene_is() -> None:
+    """Impacts between two ticks were not seen: no force of 81 N, and no loss, of a hit that lasts 2 ms."""
+    scene = scenes.load("case_01", [*PUSHED, "time.duration_s=4", "time.control_period_s=0.01"])
+
+    def own(law: ControlLaw) -> Callable[[int, float, float, float], float]:
+        return lambda tick, t, x, v: law.command(tick, x, v)
+
+    laws = {NAMES[side]: own(law) for side, law in scene.system.laws.items()}
+    runs = [summary(simulate(scene, sampled=True)), summary(simulate(scene, controllers=laws))]
+    assert runs[0]["largest_N"] == runs[1]["largest_N"]
+    assert runs[0]["largest_of"] == runs[1]["largest_of"] == MOTION
+    assert runs[0]["last_outside_s"] == runs[1]["last_outside_s"]
+    for cause in ("dampers", "impacts", "friction"):
+        assert runs[0]["lost_J"][cause] == runs[1]["lost_J"][cause]
+
+
+def test_the_rate_of_V_has_the_power_of_external_forces() -> None:
+    """It was left out of the table, although V_c rose with it, and the graph's `lyapunov` had it."""
+    run = simulate(scenes.load("case_01", PUSHED), grid=np.linspace(1.2, 1.3, 1001))
+    level, free = run.energy, ~run.impacts.any(axis=1)
+    slope = np.gradient(level.V_c, run.t)
+    inner = free[:-2] & free[1:-1] & free[2:]
+    assert inner.sum() > 100
+    assert level.V_rate[1:-1][inner] == pytest.approx(slope[1:-1][inner], abs=1e-4)
 
 
 @pytest.mark.parametrize("name", ["case_01", "case_03", "case_05", "case_07", "noise", "saturation", "everything"])

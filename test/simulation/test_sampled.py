@@ -155,11 +155,12 @@ def test_changes_act_from_their_tick_on() -> None:
     [
         ({5: {"left_feedback.position_gain_N_per_m": 9.0}}, False, "continuous"),
         ({5: {"object.mass_kg": 9.0}}, True, "object.mass_kg at tick 5"),
+        ({5: {"left_sensor.position_noise_m": 0.1}}, True, "left_sensor.position_noise_m at tick 5"),
     ],
 )
 def test_changes_that_no_graph_would_take_are_refused(changes: dict, sampled: bool, words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        simulate(scenes.load("case_01", ["time.duration_s=1"]), sampled=sampled, changes=changes)
+        simulate(scenes.load("noise" if sampled else "case_01"), sampled=sampled, changes=changes)
 
 
 @pytest.mark.parametrize("forces", [1.0, [1.0, 2.0], [1.0, np.nan, 0.0], "abc", np.zeros((3, 1)), None])

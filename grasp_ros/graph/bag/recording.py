@@ -236,9 +236,11 @@ class Recording(Tabular, Frozen):
 
         Of the plant alone, without its controllers, unless `closed`.
         """
+        ticks, place = np.unique(self.scene_tick, return_inverse=True)
+        external = self.scene.system.external_over(ticks)[place]
         if not self.closed:
-            return energy(self.scene.system, self.state, feedback=False)
-        parts = [energy(scene.system, self.state[rows]) for scene, rows in self.parts]
+            return energy(self.scene.system, self.state, external, feedback=False)
+        parts = [energy(scene.system, self.state[rows], external[rows]) for scene, rows in self.parts]
         return Energy(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
     @property

@@ -19,8 +19,9 @@ MOST_DELAY = 50  # control periods; the eigenvalues of longer loops take longer 
 def _build(sections: Sections, system: System) -> None:
     system.sampled = True
     system.delay = sections["loop"].get("delay_ticks", 0)
-    system.caveats.append(HELD)
-    if system.delay:
+    if system.laws:
+        system.caveats.append(HELD)
+    if system.laws and system.delay:
         system.caveats.append(f"commands come {system.delay} control periods late")
 
 
