@@ -35,6 +35,14 @@ def test_a_pair_that_begins_beside_a_harder_one_takes_steps_of_a_part_of_its_age
     assert simulate(scene, grid=[0.0, scene.duration]).work[Work.CONTACT_STEPS] <= steps
 
 
+@pytest.mark.parametrize(("name", "events"), [("side_by_side_on_a_slope", 4), ("slips_against_a_waiting_arm", 11)])
+def test_a_pair_that_another_one_presses_begins_once(name: str, events: int) -> None:
+    """Roundings of u'' parted it again, for millions of steps where equal accelerations cancel."""
+    run = simulate(load(name))
+    assert len(run.event_table) == events
+    assert run.work[Work.CONTACT_STEPS] < 300
+
+
 def test_answers_belong_to_scenes() -> None:
     assert set(ANSWERS) <= set(names())
     assert all(len(row) == 6 for right in ANSWERS.values() for row in right.state)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.automaton.begin import leaves_force_out, speed_of_pair
+from grasp_ros.exact.automaton.edge import LOWEST, difference, impact_beside
 from grasp_ros.exact.automaton.friction import slide_in_contact
 from grasp_ros.exact.compensated import add, move_arm_in_contact, move_in_flight
 from grasp_ros.exact.compilation.jit import inlined, kernel, whole
@@ -17,7 +18,7 @@ from grasp_ros.exact.numerics.polynomial import invert_time, lane_range, values
 from grasp_ros.exact.numerics.powers_of_two import power_of_two
 from grasp_ros.exact.numerics.roots import first_rise
 from grasp_ros.exact.records import Array, Candidate, Ends, Integers, Plant, Segment, Settings, State, Tables
-from grasp_ros.exact.tolerances import CANCELS, NOISE, TOGETHER
+from grasp_ros.exact.tolerances import CANCELS, DERIVATIVE, NOISE, TOGETHER
 from grasp_ros.physics.layout import (
     EPS,
     LANES,
@@ -169,22 +170,32 @@ def force_free_length(tables: Tables, plant: Plant, state: State, n: int, s: flo
 
     It is doubled from a small one: at a later time a pair that has been beyond the bound may be within it again.
     """
-    part = power_of_two(-MOST_HALVINGS)
+    part, left, right = power_of_two(-MOST_HALVINGS), blur(plant, state, LEFT), blur(plant, state, RIGHT)
     while part < 1.0:
         values(tables.c, n, 2.0 * part * s, tables.at)
-        if not (may_last(plant, state, LEFT, tables.at) and may_last(plant, state, RIGHT, tables.at)):
+        if not (may_last(plant, state, LEFT, tables.at, left) and may_last(plant, state, RIGHT, tables.at, right)):
             break
         part *= 2.0
     return part * s
 
 
+@kernel
+def blur(plant: Plant, state: State, side: Body) -> float:
+    """Rounding of u'' of a pair that begins beside one in contact, m/s^2."""
+    return DERIVATIVE * (difference(plant, state.y, side, LOWEST)[1] + impact_beside(plant, state, side)[0])
+
+
 @inlined
-def may_last(plant: Plant, state: State, side: Body, at: Array) -> bool:
-    """Whether a pair that begins has neither come back at the values `at`, nor a force that shows there."""
+def may_last(plant: Plant, state: State, side: Body, at: Array, blurred: float) -> bool:
+    """Whether a pair that begins has neither come back at the values `at`, nor a force that shows there.
+
+    By more than roundings: of u'' it has those that are `blurred`, m/s^2, and so u and u' have more the later it is.
+    """
     if state.mode[side] != Pair.BEGINNING:
         return True
-    u, d, speed = at[Z.L + side], approach(at, side), speed_of_pair(at, side)
-    return bool(u >= -EPS * abs(at[X.O]) and leaves_force_out(plant, side, u, d, speed))
+    t, u, d, speed = at[Lane.TIME], at[Z.L + side], abs(approach(at, side)), speed_of_pair(at, side)
+    least = EPS * speed + blurred * t
+    return bool(u >= -EPS * abs(at[X.O]) - least * t and leaves_force_out(plant, side, u, max(d, least), speed))
 
 
 @inlined
