@@ -30,10 +30,10 @@ LAST_EVENTS = 4  # whose derivatives are shown
 
 
 def table(rows: Iterable[Row]) -> str:
-    """Two aligned columns."""
+    """Two aligned columns, a line for each row: a title may have several."""
     rows = list(rows)
     width = max(len(name) for name, _ in rows)
-    return printable("\n".join(f"{name:<{width}}  {value}" for name, value in rows))
+    return printable("\n".join(f"{name:<{width}}  {' '.join(value.splitlines())}" for name, value in rows))
 
 
 def describe_trajectory(trajectory: Trajectory, found: dict[str, Any]) -> list[Row]:
@@ -64,7 +64,7 @@ def _amounts(found: dict[str, Any]) -> list[Row]:
     """Settling times, largest forces, and the energy lost by cause, as far as the scene has them."""
     rows = []
     if "settled_s" in found:
-        times, never = found["settled_s"], f"not within {found['settled_within_s']:g} s"
+        times, never = found["settled_s"], f"not proved within {found['settled_within_s']:g} s"
         settled = ", ".join(f"{name} {time:.2f} s" for name, time in times.items())
         rows.append((f"settled to {SETTLED:.0%}", settled if np.isfinite([*times.values()]).all() else never))
     if "last_outside_s" in found:

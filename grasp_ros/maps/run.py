@@ -27,20 +27,17 @@ def run(
     address of one that exists. `progress` is told the number of rows that are done. Refused: a plan that cannot be run,
     a file that is something else or cannot be written, workers that die again and again; what is done is kept.
     """
-    check(plan)
-    store = Store(Path(path), plan, chunk_rows(plan.scene, plan.setup))
-    spans = store.spans
-    done, told = plan.rows - sum(last - first for first, last in spans), progress or (lambda _: None)
-    told(done)
-    if not spans:
-        return
-
     def work(span: Span, stop: NDArray[np.int64]) -> Chunk:
         return compute(plan.variants(*span), plan.setup, stop)
 
-    with cluster.connect(workers, scheduler) if workers or scheduler else nullcontext() as client, closing(
-            in_threads(work, spans) if client is None else cluster.on_cluster(client, plan, spans)) as found:
-        for span, chunk in found:
-            store.write(span, chunk)
-            done += span[1] - span[0]
-            told(done)
+    check(plan)
+    with cluster.connect(workers, scheduler) if workers or scheduler else nullcontext() as client:
+        store = Store(Path(path), plan, chunk_rows(plan.scene, plan.setup))
+        spans, told = store.spans, progress or (lambda _: None)
+        done = plan.rows - sum(last - first for first, last in spans)
+        told(done)
+        with closing(in_threads(work, spans) if client is None else cluster.on_cluster(client, plan, spans)) as found:
+            for span, chunk in found:
+                store.write(span, chunk)
+                done += span[1] - span[0]
+                told(done)
