@@ -7,18 +7,18 @@ import math
 from grasp_ros.exact.automaton.begin import leaves_force_out, speed_of_pair
 from grasp_ros.exact.automaton.edge import LOWEST, difference, impact_beside
 from grasp_ros.exact.automaton.friction import slide_in_contact
-from grasp_ros.exact.compensated import add, move_arm_in_contact, move_in_flight
+from grasp_ros.exact.compensated import add, keep_together, move_arm_in_contact, move_in_flight
 from grasp_ros.exact.compilation.jit import inlined, kernel, whole
 from grasp_ros.exact.contact.step_unit import new_step
 from grasp_ros.exact.contact.taylor_step import accepted_length, fitted_step
 from grasp_ros.exact.flight.closed_form import flights_of, fly
 from grasp_ros.exact.impact import damping_factor
-from grasp_ros.exact.kinematics import approach, rate_lanes
+from grasp_ros.exact.kinematics import approach, is_resting, rate_lanes, surface_factor
 from grasp_ros.exact.numerics.polynomial import invert_time, lane_range, values
 from grasp_ros.exact.numerics.powers_of_two import power_of_two
 from grasp_ros.exact.numerics.roots import first_rise
 from grasp_ros.exact.records import Array, Candidate, Ends, Integers, Plant, Segment, Settings, State, Tables
-from grasp_ros.exact.tolerances import CANCELS, DERIVATIVE, NOISE, TOGETHER
+from grasp_ros.exact.tolerances import CANCELS, DERIVATIVE, NOISE, SURFACE, TOGETHER
 from grasp_ros.physics.layout import (
     EPS,
     LANES,
@@ -91,7 +91,10 @@ def surface_candidate(tables: Tables, plant: Plant, state: State, n: int, side: 
         slowest = lane_range(c, size, front, h, at[front])[0] - lane_range(c, size, back, h, at[back])[1]
         if damping_factor(loss, c[front] - c[back]) >= 0.0 and damping_factor(loss, slowest) > NOISE:
             return math.inf, Transition.CLAMP
-        return rise_of_lanes(tables, n, h, -loss, front, back, -1.0, work), Transition.CLAMP
+        # A force that dies out at -1/p beside another one that pushes: to pass it is more than to be at it.
+        beyond = 2.0 * SURFACE * EPS * damping_factor(loss, abs(c[front]) + abs(c[back]))
+        offset = -1.0 - beyond if surface_factor(plant.pairs, state.y, side, SURFACE) == 0.0 else -1.0
+        return rise_of_lanes(tables, n, h, -loss, front, back, offset, work), Transition.CLAMP
     if mode == Pair.CLAMPED:
         return rise_of_lanes(tables, n, h, loss, front, back, 1.0, work), Transition.REENTRY
     return math.inf, Transition.CLAMP
@@ -193,15 +196,32 @@ def may_last(plant: Plant, state: State, side: Body, at: Array, blurred: float) 
     """
     if state.mode[side] != Pair.BEGINNING:
         return True
-    t, u, d, speed = at[Lane.TIME], at[Z.L + side], abs(approach(at, side)), speed_of_pair(at, side)
-    least = EPS * speed + blurred * t
-    return bool(u >= -EPS * abs(at[X.O]) - least * t and leaves_force_out(plant, side, u, max(d, least), speed))
+    u, d, (least_u, least_d) = at[Z.L + side], abs(approach(at, side)), roundings(at, side, blurred)
+    return bool(u >= -least_u and leaves_force_out(plant, side, u, max(d, least_d), speed_of_pair(at, side)))
 
 
 @inlined
-def move_by_step(tables: Tables, segment: Segment, state: State) -> None:
-    """Move the state on to the end of a step, whose values stand in `tables.at`."""
+def roundings(at: Array, side: Body, blurred: float) -> tuple[float, float]:
+    """Those of u and u' of a pair that begins at the values `at` of a step."""
+    least = EPS * speed_of_pair(at, side) + blurred * at[Lane.TIME]
+    return EPS * abs(at[X.O]) + least * at[Lane.TIME], least
+
+
+@inlined
+def has_not_begun(plant: Plant, state: State, side: Body, at: Array) -> bool:
+    """Whether a pair that begins at rest is no more than its roundings further at the end of a step."""
+    if state.mode[side] != Pair.BEGINNING or not is_resting(state.y, side):
+        return False
+    least_u, least_d = roundings(at, side, blur(plant, state, side))
+    return bool(abs(at[Z.L + side]) <= least_u and abs(approach(at, side)) <= least_d)
+
+
+@inlined
+def move_by_step(tables: Tables, plant: Plant, segment: Segment, state: State) -> None:
+    """Move the state on to the end of a step, whose values stand in `tables.at`; what nothing moves stays together."""
     at, (left, right, _) = tables.at, segment.flights
+    alike_l = state.mode[LEFT] == Pair.RESTING or has_not_begun(plant, state, LEFT, at)
+    alike_r = state.mode[RIGHT] == Pair.RESTING or has_not_begun(plant, state, RIGHT, at)
     add(state, X.O, at[LANES + X.O])
     add(state, V.O, at[LANES + V.O])
     if segment.step.left:
@@ -214,6 +234,10 @@ def move_by_step(tables: Tables, segment: Segment, state: State) -> None:
         add(state, V.R, at[LANES + V.R])
     else:
         move_in_flight(state, RIGHT, fly(right, segment.t))
+    if alike_l:
+        keep_together(state, LEFT)
+    if alike_r:
+        keep_together(state, RIGHT)
 
 
 @inlined

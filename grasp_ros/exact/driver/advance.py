@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 from grasp_ros.exact.automaton.modes import make_transitions, settle_pairs
-from grasp_ros.exact.compensated import keep_together, tick, until, write_penetrations
+from grasp_ros.exact.compensated import tick, until, write_penetrations
 from grasp_ros.exact.compilation.jit import door, inlined
 from grasp_ros.exact.contact.segment import cut_step, move_by_step, press, state_in_step, step_ends
 from grasp_ros.exact.contact.step_unit import new_settings, within_decay
@@ -61,10 +61,7 @@ def move(tables: Tables, plant: Plant, segment: Segment, state: State) -> None:
     if segment.kind == Kind.FLIGHT:
         move_by_flight(plant, segment, state)
     else:
-        move_by_step(tables, segment, state)
-        for side in (LEFT, RIGHT):
-            if state.mode[side] == Pair.RESTING:
-                keep_together(state, side)
+        move_by_step(tables, plant, segment, state)
     write_penetrations(state)
 
 
