@@ -1,6 +1,7 @@
 """A motion that has come to rest: it moves by less than REST of the scale of the scene, and will not start again.
 
-Positions and velocities are relative to the largest position and the largest energy with which an interval has begun.
+Positions and velocities are relative to the largest position and the largest energy with which an interval has begun,
+or to those that springs hold now.
 """
 
 from __future__ import annotations
@@ -27,8 +28,15 @@ def keep_scale(state: State, begin: Level) -> None:
 
 @inlined
 def may_rest(plant: Plant, state: State) -> bool:
-    """Whether no body moves any more: what most segments need to know, for less."""
-    y, most = state.y, REST * REST * state.rest[ENERGY]
+    """Whether no body moves any more: what most segments need to know, for less.
+
+    Springs that hold what pushes a motion which began without energy have some by now.
+    """
+    y, held = state.y, 0.0
+    for body in (LEFT, OBJECT, RIGHT):
+        x = y[velocity_lane(body) - 1]
+        held += plant.given[body, Of.STIFFNESS] * x * x
+    most = REST * REST * max(state.rest[ENERGY], held)
     return bool(plant.given[LEFT, Of.MASS] * y[V.L] * y[V.L] <= most
                 and plant.given[RIGHT, Of.MASS] * y[V.R] * y[V.R] <= most
                 and plant.given[OBJECT, Of.MASS] * y[V.O] * y[V.O] <= most)
