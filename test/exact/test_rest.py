@@ -39,6 +39,20 @@ def test_what_rests_is_where_its_forces_balance_and_costs_nothing_more(name: str
     assert np.nanmax(np.abs(before[0] - before[1])) <= 8.0 * REST
 
 
+@pytest.mark.parametrize("place", [0.0, 1e-12, 0.001])
+def test_a_motion_that_begins_with_little_energy_comes_to_rest(place: float) -> None:
+    """Beside the energy of its begin, which was none, nothing was at rest."""
+    scene = scenes.compose("slope", {
+        "time": {"duration_s": 100.0, "control_period_s": 0.1}, "tilt": {"angle_rad": 0.2, "gravity_m_per_s2": 9.81},
+        "left_arm": {"mass_kg": 1.0, "position_m": place, "velocity_m_per_s": 0.0, "stiffness_N_per_m": 100.0,
+                     "damping_Ns_per_m": 10.0},
+    })
+    run = simulate(scene)
+    assert run.at_rest is not None
+    assert 4.0 < run.at_rest < 20.0
+    assert run.state[-1, 0] == pytest.approx(-9.81 * math.sin(0.2) / 100.0, rel=1e-15)
+
+
 @pytest.mark.parametrize("horizon", [50.0, 200.0, 1e4])
 def test_a_decayed_motion_near_critical_damping_rests(horizon: float) -> None:
     """A gap of 1e-310 m was followed until a search did not end."""

@@ -35,9 +35,12 @@ def test_a_pair_that_begins_beside_a_harder_one_takes_steps_of_a_part_of_its_age
     assert simulate(scene, grid=[0.0, scene.duration]).work[Work.CONTACT_STEPS] <= steps
 
 
-@pytest.mark.parametrize(("name", "events"), [("side_by_side_on_a_slope", 4), ("slips_against_a_waiting_arm", 11)])
-def test_a_pair_that_another_one_presses_begins_once(name: str, events: int) -> None:
-    """Roundings of u'' parted it again, for millions of steps where equal accelerations cancel."""
+@pytest.mark.parametrize(("name", "events"), [
+    ("side_by_side_on_a_slope", 4), ("slips_against_a_waiting_arm", 11), ("pressed_gently_on_a_slope", 4),
+    ("pushed_while_its_force_dies_out", 10),
+])
+def test_roundings_beside_another_impact_make_no_events(name: str, events: int) -> None:
+    """Those of u'' parted a pair that begins, for millions of steps, and those of u' clamped one at -1/p."""
     run = simulate(load(name))
     assert len(run.event_table) == events
     assert run.work[Work.CONTACT_STEPS] < 300
