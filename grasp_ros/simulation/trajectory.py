@@ -67,7 +67,8 @@ class Trajectory(Tabular, Frozen):
     controllers : mapping of str to str
         Names of the controllers that acted in place of the scene's feedback, by side.
     at_rest : float or None
-        Time in s since when everything is at rest for good, see `exact.driver.rest`; only `exact` tells.
+        Time in s since when everything is at rest for good, see `exact.driver.rest`; only `exact` tells, and not of
+        held commands, of which another one may follow.
     sensitivity : Sensitivity or None
         Derivatives of the motion, where `simulate` was asked for them; see `differentiate.Sensitivity`. They belong to
         no file.

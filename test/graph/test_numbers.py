@@ -21,7 +21,16 @@ from grasp_ros.graph.running import Running
 from grasp_ros.graph.serialization import list_message
 from grasp_ros.physics.layout import OBJECT
 from grasp_ros.physics.system import COLUMN, NAMES
-from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, LYAPUNOV, LYAPUNOV_NAMES, TIMING, Topic, timing_names
+from grasp_ros.scene.topics import (
+    JOINT_STATES,
+    LEFT_COMMAND,
+    LYAPUNOV,
+    LYAPUNOV_NAMES,
+    SCENE,
+    TIMING,
+    Topic,
+    timing_names,
+)
 from grasp_ros.simulation import simulate
 from lab.drills import recorder as study
 
@@ -179,6 +188,18 @@ def test_every_number_of_the_monitor_is_verified(tmp_path: Path, name: str, valu
     assert not found.holds
     assert (found.difference.tick, found.difference.topic) == (40, "lyapunov")
     assert found.difference.name == ("V" if name == "closed" else name)  # V is not there where it is not closed
+
+
+def test_a_topic_with_another_scene_than_that_of_the_bag_is_refused(tmp_path: Path) -> None:
+    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
+    for name, changes in (("same", {}), ("other", {"object.mass_kg": 9.0})):
+        ticks, kind = list(study.ticks_of(run)), STORE.types[SCENE.type]
+        content = kind(data=run.scene.changed(changes).to_yaml() if changes else run.scene.to_yaml())
+        ticks[0][1].insert(0, (SCENE, bytes(STORE.serialize_cdr(content, SCENE.type))))
+        written(tmp_path / name, run.scene, ticks)
+    assert verify(bag.read(tmp_path / "same")).holds
+    with pytest.raises(bag.BagError, match="scene: not what the bag's own record says"):
+        bag.read(tmp_path / "other")
 
 
 @pytest.mark.parametrize("times", [(0, 1, 1), (0, 2, 1), (0, 1, 0.5)])

@@ -21,7 +21,7 @@ import numpy as np
 from grasp_ros import scene as scenes
 from grasp_ros.graph.bag.errors import BagError, EmptyBagError
 from grasp_ros.graph.bag.opening import UNREADABLE, Opened, decoding_bag
-from grasp_ros.graph.bag.recorder import BESIDE, LOST_RECORD, checksum
+from grasp_ros.graph.bag.recorder import BESIDE, LOST_RECORD, OWN_RECORD, checksum
 from grasp_ros.graph.bag.recording import Recording, acted_from
 from grasp_ros.graph.bag.rosbag2 import decode
 from grasp_ros.graph.bag.storage import Storage, Stored
@@ -31,7 +31,19 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import read_text
-from grasp_ros.scene.topics import CHANGES, CLOCK, FORCE, JOINT_STATES, LYAPUNOV, TIMING, Numbers, Topic, timing_names
+from grasp_ros.scene.topics import (
+    CHANGES,
+    CLOCK,
+    FORCE,
+    JOINT_STATES,
+    LYAPUNOV,
+    RUN,
+    SCENE,
+    TIMING,
+    Numbers,
+    Topic,
+    timing_names,
+)
 
 __all__ = ["BagError", "Recording", "read"]
 MOST_NS = 2**63 - 1
@@ -56,6 +68,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
             **{topic: column.add for topic, column in columns.items()},
             **{topic: partial(changes.add, topic, scene) for topic in CHANGES.values()},
             TIMING: lambda stored: timing.extend(_of_a_plant(quality, stored)),
+            **{topic: partial(_check_text, opened, topic) for topic in (SCENE, RUN)},
         }
         counts = dict.fromkeys(opened.names, 0)
         for topic, stored in opened.messages:
@@ -67,6 +80,12 @@ def read(path: str | os.PathLike[str]) -> Recording:
         _check_metadata(opened.path, opened.storage)
         table = dict(zip(quality, np.array(timing).T, strict=True)) if timing else {}
         return _recording(opened, columns, changes, {topic.name: count for topic, count in counts.items()}, table)
+
+
+def _check_text(opened: Opened, topic: Topic, stored: Stored) -> None:
+    """Refuse another scene, or another run, than that of the bag."""
+    if decode(topic, stored.cdr).data != opened.storage.records[OWN_RECORD][topic.name]:
+        raise BagError(f"{stored.topic}: not what the bag's own record says; allowed: the same")
 
 
 def columns_of(opened: Opened) -> dict[Topic, Columns]:

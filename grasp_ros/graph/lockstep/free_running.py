@@ -120,7 +120,9 @@ class FreeRunning:
             self._set_anchor()
         if self._steering.steps:  # asked for: not with the clock; the timer calls again
             end = time.monotonic() + BURST_SECONDS
-            while time.monotonic() < end and not (plant.finished or plant.outrun()) and self._steering.go_on():
+            while (now := time.monotonic()) < end and not (plant.finished or plant.outrun() or self._waits(now)):
+                if not self._steering.go_on():
+                    break
                 self._step()
         if self._steering.stands or self._steering.steps:
             self._timing.pause()
