@@ -99,6 +99,29 @@ def test_a_state_that_comes_again_is_one_tick_and_a_reset_is_two() -> None:
     assert found.put(JOINT_STATES, state(0)) is Arrival.AGAIN
 
 
+def test_a_command_from_before_the_first_state_gives_way_to_the_one_that_answers_it() -> None:
+    """It was recorded in place of the answer, and the bag did not follow from its inputs."""
+    found = ticks()
+    assert found.put(LEFT_COMMAND, command(0, 0.0)) is Arrival.TAKEN
+    found.put(JOINT_STATES, state(0))
+    assert found.take() is None
+    assert found.put(LEFT_COMMAND, command(0, 1.5)) is Arrival.TAKEN
+    row = found.take()
+    assert row is not None
+    assert raw_force(row.found[LEFT_COMMAND]) == 1.5
+
+
+def test_the_last_tick_waits_for_no_later_state() -> None:
+    """Where sources had just changed it stood until DDS forgot the dead one."""
+    found, last = ticks(), END // PERIOD
+    found.put(JOINT_STATES, state(last))
+    found.put(LEFT_COMMAND, command(last), sure=False)
+    assert found.take() is None
+    row = found.take(waited=2.0)
+    assert row is not None
+    assert LEFT_COMMAND in row.found
+
+
 def test_what_is_kept_is_bounded() -> None:
     found = ticks()
     for tick in range(4 * PATIENCE_TICKS):

@@ -91,6 +91,7 @@ def test_who_comes_late_takes_what_comes_before_the_first_state() -> None:
     ticks, late = Synchronizer([LEFT_COMMAND], ["left"], PERIOD, END), 6000
     assert ticks.put(LEFT_COMMAND, command(late, 2.0)) is Arrival.TAKEN
     ticks.put(JOINT_STATES, state(late))
+    ticks.put(JOINT_STATES, state(late + 1, effort=2.0))  # it has acted, and is no stray
     found = ticks.take()
     assert found is not None
     assert (raw_force(found.found[LEFT_COMMAND]), found.lost) == (2.0, 0)

@@ -61,8 +61,8 @@ class Synchronizer:
     to it and what came before belongs to none. What is kept is bounded, whoever sends.
 
     A command acts over the period that follows its state, or later with a delay, and a later state has it as its
-    effort. That decides where a command came when its topic may have had another source, and stands for one that did
-    not come at all.
+    effort. That decides where a command came before the first state, or when its topic may have had another source, and
+    stands for one that did not come at all.
 
     `topics` are, beside `joint_states`, those with a message for every state; `names` those that every state has. Every
     stamp is a multiple of `period_ns` and not above `end_ns`. A command acts `delay` control periods after its arrival.
@@ -108,6 +108,7 @@ class Synchronizer:
             return Arrival.STAMP
         if topic.type == FORCE and not math.isfinite(raw_force(cdr)):
             return Arrival.REFUSED
+        sure = sure and (self._newest >= 0 or topic not in ARMS)  # before the first state it may answer none
         queue = self._others[topic]
         known = queue.get(stamp, NOTHING)
         others = [other for other in known.found
@@ -148,7 +149,8 @@ class Synchronizer:
         """The command that acted, and whether it was made from the effort, as nobody sent it here."""
         force = self._acted(ARMS[topic], time_ns)
         if force is None:  # it is still to come, or it was reset before, or no plant may be so far ahead
-            to_come = len(self._states) <= self._wait < WINDOW
+            to_come = (len(self._states) <= self._wait < WINDOW
+                       and time_ns + self._wait * self._period_ns <= self.end_ns)
             return (there[-1] if there and late and not to_come else None), False
         for cdr in there:
             if raw_force(cdr) == force:
