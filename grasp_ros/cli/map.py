@@ -101,7 +101,7 @@ def _map(options: argparse.Namespace) -> int:
 
 HEADS = {"least": 0.0, "5 %": 0.05, "median": 0.5, "95 %": 0.95, "largest": 1.0}
 COUNTS = {"inf": np.isinf, "nan": np.isnan}
-CDF: Any = "inverted_cdf"  # each a value that is there
+CDF: Any = "inverted_cdf"  # gives one of the values, never one between
 DONE = STATUSES.index(Status.DONE.name)
 
 
@@ -115,7 +115,7 @@ def data_of(data: Any) -> dict[str, Any]:
         known = values[~np.isnan(values)]
         parts, cells = np.array([*HEADS.values()]), [np.nan] * len(HEADS)
         if len(known):  # the mean of two values where a part falls between them: of a finite and an infinite one, inf
-            low, high = np.quantile(known, parts, method=CDF), -np.quantile(-known, 1.0 - parts, method=CDF)
+            low, high = np.quantile(known, parts, method=CDF), -np.quantile(-known, parts[::-1], method=CDF)
             cells = (0.5 * (low + high)).tolist()
         found[name] = {"units": data[name].attrs["units"], **dict(zip(HEADS, cells, strict=True)),
                        **{head: int(count(values).sum()) for head, count in COUNTS.items()}}

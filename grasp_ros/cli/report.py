@@ -30,7 +30,7 @@ LAST_EVENTS = 4  # whose derivatives are shown
 
 
 def table(rows: Iterable[Row]) -> str:
-    """Two aligned columns, a line for each row: a title may have several."""
+    """Two aligned columns, a line for each row, also where a value has several lines."""
     rows = list(rows)
     width = max(len(name) for name, _ in rows)
     return printable("\n".join(f"{name:<{width}}  {' '.join(value.splitlines())}" for name, value in rows))

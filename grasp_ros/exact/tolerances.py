@@ -12,6 +12,7 @@ from grasp_ros.physics.layout import EPS
 TOGETHER = 1.0 + 4.0 * EPS  # events closer than this happen together: their times are sums of a few roundings
 DERIVATIVE = 64.0 * EPS  # of the sum of its terms: a derivative below it is none, it is their cancellation
 SURFACE = 4.0  # roundings of the terms of 1 + p u', within which a pair is at u' = -1/p
+BEYOND = 2.0 * SURFACE  # the same below -1/p: there a pair is clamped that was at it, as where its force dies out
 SURFACE_DRIFT = 1024.0  # the same after flights, which leave roundings in u'
 FRICTION = 16.0 * EPS  # of the terms of what holds an object: of a force, and of a state that rests under it
 LEFT_OUT = 0.25  # impulse of a pair that leaves without force, in units of the accuracy

@@ -31,6 +31,7 @@ def run(
         return compute(plan.variants(*span), plan.setup, stop)
 
     check(plan)
+    # First, so that a scheduler that does not answer leaves no file behind.
     with cluster.connect(workers, scheduler) if workers or scheduler else nullcontext() as client:
         store = Store(Path(path), plan, chunk_rows(plan.scene, plan.setup))
         spans, told = store.spans, progress or (lambda _: None)

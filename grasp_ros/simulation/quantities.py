@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from grasp_ros.exact.integrator import Status
+from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.given import whole
 from grasp_ros.physics.lyapunov import displacement_bound
@@ -54,15 +54,18 @@ def last_outside(t: Array, position: Array, distance: float) -> Array:
 def as_row(run: Trajectory, *outcomes: str, horizons: int = HORIZONS) -> dict[str, float] | None:
     """Outcomes of an exact run, those of a row of an ensemble: it is integrated again, and watched.
 
-    Other controllers than the scene's act by their recorded commands. None for another method, a run that stopped, and
-    where such commands were not recorded at every control period.
+    Other controllers than the scene's act by their recorded commands. None for another method, a run that stopped, one
+    that ends elsewhere, and where such commands were not recorded at every control period.
     """
     end = np.array([run.scene.duration])
     if run.method != EXACT or run.status is not Status.DONE or (run.controllers and not has_commands(run, end)):
         return None
     setup = Setup((*outcomes, "last_state"), run.setting, run.sampled, SETTLED, horizons, UNLIMITED, UNLIMITED)
-    move = (lambda _, integrator, __, ___: with_commands(run, end, integrator)) if run.controllers else drive
-    columns = compute(Variants(run.scene, {}), setup, in_one_call=False, move=move).columns
+
+    def again(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -> Array:
+        return with_commands(run, end, integrator) if run.controllers else drive(scene, integrator, sampled, grid)
+
+    columns = compute(Variants(run.scene, {}), setup, in_one_call=False, move=again).columns
     found = {name: float(own[0]) for name, own in columns.items()}
     last = [found[name] for name in GROUPS["last_state"]]
     if run.sampled and not np.array_equal([[run.scene.duration, *last]], np.c_[run.t, run.state][-1:], equal_nan=True):

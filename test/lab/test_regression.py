@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from grasp_ros.physics.layout import Work
+from grasp_ros.scene import compose
 from grasp_ros.simulation import simulate
 from lab.cases.regression import answer, answers, load, names, verdict
 
@@ -44,6 +45,23 @@ def test_roundings_beside_another_impact_make_no_events(name: str, events: int) 
     run = simulate(load(name))
     assert len(run.event_table) == events
     assert run.work[Work.CONTACT_STEPS] < 300
+
+
+def test_what_moves_alike_is_told_by_what_a_step_adds() -> None:
+    """Three bodies at 1000 m/s, one of them pressed: told by roundings of the speed, momentum was made."""
+    body = {"position_m": 0.0, "velocity_m_per_s": 0.0}
+    scene = compose("pressed", {
+        "time": {"duration_s": 1.0, "control_period_s": 1.0}, "left_arm": {"mass_kg": 1.0, **body},
+        "object": {"mass_kg": 1.0, **body}, "right_arm": {"mass_kg": 1e-3, **body},
+        "left_contact": {"hertz_N_per_m1_5": 1e6}, "right_contact": {"hertz_N_per_m1_5": 1e9},
+        "right_arm_pulse": {"force_N": -1e-11, "start_s": 0.0, "length_s": 1.0},
+    })
+    fast = scene.changed({f"{name}.velocity_m_per_s": 1000.0 for name in ("left_arm", "object", "right_arm")})
+    masses = np.array([1.0, 1.0, 1e-3])
+    for moving, speed in ((scene, 0.0), (fast, 1000.0)):
+        gained = simulate(moving, grid=[1.0]).state[-1, 1::2] - speed
+        assert masses @ gained == pytest.approx(-1e-11, rel=0.02, abs=0.0)  # roundings of the speed
+        assert gained[:2] == pytest.approx([-2.316e-12, -7.653e-12], rel=0.03, abs=0.0)
 
 
 def test_answers_belong_to_scenes() -> None:

@@ -20,6 +20,7 @@ from processes import wait_for
 
 from grasp_ros import scene as scenes
 from grasp_ros.cli.main import main
+from grasp_ros.cli.map import data_of
 from grasp_ros.maps import figures
 from grasp_ros.maps import run as runs
 from grasp_ros.maps.plan import POINTS, Axis, Plan, read_axis
@@ -295,6 +296,16 @@ def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureF
     assert main(["map", "case_01", "--set", SHORT, "--x", f"{GAIN}=1:2:2", "-o", str(tmp_path / "new.zarr")]) == 2
     assert "new_touches_left.png: already exists" in capsys.readouterr().err
     assert picture.read_text() == "somebody else's"
+
+
+def test_quantiles_between_two_values_are_their_mean() -> None:
+    """Those of an even number were the lower one; the last was not the mirror image of the first."""
+    units = {"units": "s"}
+    for values, right in ((np.arange(1.0, 21.0), [1.0, 1.5, 10.5, 19.5, 20.0]),
+                          (np.array([1.0, 2.0, np.inf, np.inf]), [1.0, 1.0, np.inf, np.inf, np.inf])):
+        data = xarray.Dataset({"settling_time": ("row", values, units), "status": ("row", np.zeros(len(values), int))})
+        found = data_of(data)["settling_time"]
+        assert [found[head] for head in ("least", "5 %", "median", "95 %", "largest")] == right
 
 
 def test_ranks_of_equal_values_are_equal() -> None:

@@ -17,8 +17,8 @@ from grasp_ros.exact.kinematics import approach, is_resting, rate_lanes, surface
 from grasp_ros.exact.numerics.polynomial import invert_time, lane_range, values
 from grasp_ros.exact.numerics.powers_of_two import power_of_two
 from grasp_ros.exact.numerics.roots import first_rise
-from grasp_ros.exact.records import Array, Candidate, Ends, Integers, Plant, Segment, Settings, State, Tables
-from grasp_ros.exact.tolerances import CANCELS, DERIVATIVE, NOISE, SURFACE, TOGETHER
+from grasp_ros.exact.records import Array, Candidate, Ends, Flown, Integers, Plant, Segment, Settings, State, Tables
+from grasp_ros.exact.tolerances import BEYOND, CANCELS, DERIVATIVE, NOISE, SURFACE, TOGETHER
 from grasp_ros.physics.layout import (
     EPS,
     LANES,
@@ -91,8 +91,7 @@ def surface_candidate(tables: Tables, plant: Plant, state: State, n: int, side: 
         slowest = lane_range(c, size, front, h, at[front])[0] - lane_range(c, size, back, h, at[back])[1]
         if damping_factor(loss, c[front] - c[back]) >= 0.0 and damping_factor(loss, slowest) > NOISE:
             return math.inf, Transition.CLAMP
-        # A force that dies out at -1/p beside another one that pushes: to pass it is more than to be at it.
-        beyond = 2.0 * SURFACE * EPS * damping_factor(loss, abs(c[front]) + abs(c[back]))
+        beyond = BEYOND * EPS * damping_factor(loss, abs(c[front]) + abs(c[back]))
         offset = -1.0 - beyond if surface_factor(plant.pairs, state.y, side, SURFACE) == 0.0 else -1.0
         return rise_of_lanes(tables, n, h, -loss, front, back, offset, work), Transition.CLAMP
     if mode == Pair.CLAMPED:
@@ -184,44 +183,47 @@ def force_free_length(tables: Tables, plant: Plant, state: State, n: int, s: flo
 
 @kernel
 def blur(plant: Plant, state: State, side: Body) -> float:
-    """Rounding of u'' of a pair that begins beside one in contact, m/s^2."""
-    return DERIVATIVE * (difference(plant, state.y, side, LOWEST)[1] + impact_beside(plant, state, side)[0])
+    """Rounding of u'' at the begin of a step, m/s^2, of a pair that begins beside one in contact; 0 of any other."""
+    if state.mode[side] != Pair.BEGINNING:
+        return 0.0
+    return DERIVATIVE * (difference(plant, state.y, side, LOWEST)[1] + abs(impact_beside(plant, state, side)[0]))
 
 
 @inlined
 def may_last(plant: Plant, state: State, side: Body, at: Array, blurred: float) -> bool:
     """Whether a pair that begins has neither come back at the values `at`, nor a force that shows there.
 
-    By more than roundings: of u'' it has those that are `blurred`, m/s^2, and so u and u' have more the later it is.
+    By more than the rounding of u in m, and of u' in m/s: of u'' it has the one that is `blurred`, which adds up.
     """
     if state.mode[side] != Pair.BEGINNING:
         return True
-    u, d, (least_u, least_d) = at[Z.L + side], abs(approach(at, side)), roundings(at, side, blurred)
-    return bool(u >= -least_u and leaves_force_out(plant, side, u, max(d, least_d), speed_of_pair(at, side)))
+    t, u, d, speed = at[Lane.TIME], at[Z.L + side], approach(at, side), speed_of_pair(at, side)
+    least_d = EPS * speed + blurred * t
+    least_u = EPS * abs(at[X.O]) + least_d * t
+    if abs(u) <= least_u and abs(d) <= least_d:
+        return True
+    return bool(u >= -least_u and leaves_force_out(plant, side, u, d, speed))
 
 
 @inlined
-def roundings(at: Array, side: Body, blurred: float) -> tuple[float, float]:
-    """Those of u and u' of a pair that begins at the values `at` of a step."""
-    least = EPS * speed_of_pair(at, side) + blurred * at[Lane.TIME]
-    return EPS * abs(at[X.O]) + least * at[Lane.TIME], least
+def has_not_begun(plant: Plant, state: State, side: Body, at: Array, flown: Flown) -> bool:
+    """Whether arm and object of a pair that begins at rest have moved alike in a step, but for the rounding of u''.
 
-
-@inlined
-def has_not_begun(plant: Plant, state: State, side: Body, at: Array) -> bool:
-    """Whether a pair that begins at rest is no more than its roundings further at the end of a step."""
+    Told by what the step adds to both, which has digits of its own.
+    """
     if state.mode[side] != Pair.BEGINNING or not is_resting(state.y, side):
         return False
-    least_u, least_d = roundings(at, side, blur(plant, state, side))
-    return bool(abs(at[Z.L + side]) <= least_u and abs(approach(at, side)) <= least_d)
+    least, way = blur(plant, state, side) * at[Lane.TIME], at[LANES + X.O]
+    return bool(abs(flown.change - at[LANES + V.O]) <= least
+                and abs(flown.way - way) <= least * at[Lane.TIME] + 2.0 * EPS * abs(way))
 
 
 @inlined
 def move_by_step(tables: Tables, plant: Plant, segment: Segment, state: State) -> None:
     """Move the state on to the end of a step, whose values stand in `tables.at`; what nothing moves stays together."""
     at, (left, right, _) = tables.at, segment.flights
-    alike_l = state.mode[LEFT] == Pair.RESTING or has_not_begun(plant, state, LEFT, at)
-    alike_r = state.mode[RIGHT] == Pair.RESTING or has_not_begun(plant, state, RIGHT, at)
+    alike_l = state.mode[LEFT] == Pair.RESTING or has_not_begun(plant, state, LEFT, at, fly(left, segment.t))
+    alike_r = state.mode[RIGHT] == Pair.RESTING or has_not_begun(plant, state, RIGHT, at, fly(right, segment.t))
     add(state, X.O, at[LANES + X.O])
     add(state, V.O, at[LANES + V.O])
     if segment.step.left:

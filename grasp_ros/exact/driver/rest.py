@@ -30,16 +30,13 @@ def keep_scale(state: State, begin: Level) -> None:
 def may_rest(plant: Plant, state: State) -> bool:
     """Whether no body moves any more: what most segments need to know, for less.
 
-    Springs that hold what pushes a motion which began without energy have some by now.
+    A motion may begin without energy; then the energy that a spring holds is the scale.
     """
-    y, held = state.y, 0.0
-    for body in (LEFT, OBJECT, RIGHT):
-        x = y[velocity_lane(body) - 1]
-        held += plant.given[body, Of.STIFFNESS] * x * x
-    most = REST * REST * max(state.rest[ENERGY], held)
-    return bool(plant.given[LEFT, Of.MASS] * y[V.L] * y[V.L] <= most
-                and plant.given[RIGHT, Of.MASS] * y[V.R] * y[V.R] <= most
-                and plant.given[OBJECT, Of.MASS] * y[V.O] * y[V.O] <= most)
+    y, given = state.y, plant.given
+    moving = max(given[LEFT, Of.MASS] * y[V.L] * y[V.L], given[RIGHT, Of.MASS] * y[V.R] * y[V.R],
+                 given[OBJECT, Of.MASS] * y[V.O] * y[V.O])
+    held = max(given[LEFT, Of.STIFFNESS] * y[X.L] * y[X.L], given[RIGHT, Of.STIFFNESS] * y[X.R] * y[X.R])
+    return moving <= REST * REST * max(state.rest[ENERGY], held)
 
 
 @kernel

@@ -85,7 +85,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
 def _check_text(opened: Opened, topic: Topic, stored: Stored) -> None:
     """Refuse another scene, or another run, than that of the bag."""
     if decode(topic, stored.cdr).data != opened.storage.records[OWN_RECORD][topic.name]:
-        raise BagError(f"{stored.topic}: not what the bag's own record says; allowed: the same")
+        raise BagError(f"{opened.path}: {stored.topic}: another {topic.name} than in the bag's own record")
 
 
 def columns_of(opened: Opened) -> dict[Topic, Columns]:

@@ -108,7 +108,7 @@ class Synchronizer:
             return Arrival.STAMP
         if topic.type == FORCE and not math.isfinite(raw_force(cdr)):
             return Arrival.REFUSED
-        sure = sure and (self._newest >= 0 or topic not in ARMS)  # before the first state it may answer none
+        sure = sure and (self._newest >= 0 or topic not in ARMS)  # it may be the answer to no state
         queue = self._others[topic]
         known = queue.get(stamp, NOTHING)
         others = [other for other in known.found
