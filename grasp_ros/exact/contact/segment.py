@@ -17,7 +17,7 @@ from grasp_ros.exact.kinematics import approach, is_resting, rate_lanes, surface
 from grasp_ros.exact.numerics.polynomial import invert_time, lane_range, values
 from grasp_ros.exact.numerics.powers_of_two import power_of_two
 from grasp_ros.exact.numerics.roots import first_rise
-from grasp_ros.exact.records import Array, Candidate, Ends, Flown, Integers, Plant, Segment, Settings, State, Tables
+from grasp_ros.exact.records import Array, Candidate, Ends, Flight, Integers, Plant, Segment, Settings, State, Tables
 from grasp_ros.exact.tolerances import BEYOND, CANCELS, DERIVATIVE, NOISE, SURFACE, TOGETHER
 from grasp_ros.physics.layout import (
     EPS,
@@ -206,14 +206,14 @@ def may_last(plant: Plant, state: State, side: Body, at: Array, blurred: float) 
 
 
 @inlined
-def has_not_begun(plant: Plant, state: State, side: Body, at: Array, flown: Flown) -> bool:
+def has_not_begun(plant: Plant, state: State, side: Body, at: Array, flight: Flight) -> bool:
     """Whether arm and object of a pair that begins at rest have moved alike in a step, but for the rounding of u''.
 
     Told by what the step adds to both, which has digits of its own.
     """
     if state.mode[side] != Pair.BEGINNING or not is_resting(state.y, side):
         return False
-    least, way = blur(plant, state, side) * at[Lane.TIME], at[LANES + X.O]
+    flown, least, way = fly(flight, at[Lane.TIME]), blur(plant, state, side) * at[Lane.TIME], at[LANES + X.O]
     return bool(abs(flown.change - at[LANES + V.O]) <= least
                 and abs(flown.way - way) <= least * at[Lane.TIME] + 2.0 * EPS * abs(way))
 
@@ -222,8 +222,8 @@ def has_not_begun(plant: Plant, state: State, side: Body, at: Array, flown: Flow
 def move_by_step(tables: Tables, plant: Plant, segment: Segment, state: State) -> None:
     """Move the state on to the end of a step, whose values stand in `tables.at`; what nothing moves stays together."""
     at, (left, right, _) = tables.at, segment.flights
-    alike_l = state.mode[LEFT] == Pair.RESTING or has_not_begun(plant, state, LEFT, at, fly(left, segment.t))
-    alike_r = state.mode[RIGHT] == Pair.RESTING or has_not_begun(plant, state, RIGHT, at, fly(right, segment.t))
+    alike_l = state.mode[LEFT] == Pair.RESTING or has_not_begun(plant, state, LEFT, at, left)
+    alike_r = state.mode[RIGHT] == Pair.RESTING or has_not_begun(plant, state, RIGHT, at, right)
     add(state, X.O, at[LANES + X.O])
     add(state, V.O, at[LANES + V.O])
     if segment.step.left:

@@ -33,10 +33,10 @@ def may_rest(plant: Plant, state: State) -> bool:
     A motion may begin without energy; then the energy that a spring holds is the scale.
     """
     y, given = state.y, plant.given
-    moving = max(given[LEFT, Of.MASS] * y[V.L] * y[V.L], given[RIGHT, Of.MASS] * y[V.R] * y[V.R],
-                 given[OBJECT, Of.MASS] * y[V.O] * y[V.O])
     held = max(given[LEFT, Of.STIFFNESS] * y[X.L] * y[X.L], given[RIGHT, Of.STIFFNESS] * y[X.R] * y[X.R])
-    return moving <= REST * REST * max(state.rest[ENERGY], held)
+    most = REST * REST * max(state.rest[ENERGY], held)
+    return bool(given[LEFT, Of.MASS] * y[V.L] * y[V.L] <= most and given[RIGHT, Of.MASS] * y[V.R] * y[V.R] <= most
+                and given[OBJECT, Of.MASS] * y[V.O] * y[V.O] <= most)
 
 
 @kernel
