@@ -74,8 +74,8 @@ def _map(options: argparse.Namespace) -> int:
                   options.max_work)
     plan = Plan(scene, setup, axes, options.sample, options.seed)
     check(plan)
-    pictures = {outcome.name: options.output.with_name(f"{options.output.stem}_{outcome.name}.png")
-                for outcome in find(outcomes)}
+    columns = find(outcomes)
+    pictures = {column.name: options.output.with_name(f"{options.output.stem}_{column.name}.png") for column in columns}
     for path in pictures.values():
         if path.exists() and not options.output.exists():
             raise Refused(f"{path}: already exists; allowed: an output whose figures beside it are new")
@@ -88,7 +88,7 @@ def _map(options: argparse.Namespace) -> int:
     for why in reasons(data, plan):
         note(why)
     done = data["status"].values == DONE
-    for outcome in find(outcomes):
+    for outcome in columns:
         if outcome.wanted & Wanted.SETTLING and np.isnan(data[outcome.name].values[done]).any():
             note(f"{outcome.name} is nan where V_c proves nothing; {scene.certificate_in_words(setup.sampled)};"
                  " --outcome last_outside says how long a mass was outside")

@@ -31,10 +31,14 @@ def run(
         return compute(plan.variants(*span), plan.setup, stop)
 
     check(plan)
+    path, rows, told = Path(path), chunk_rows(plan.scene, plan.setup), progress or (lambda _: None)
+    if path.exists() and not Store(path, plan, rows).spans:  # it is done, and needs no cluster
+        told(plan.rows)
+        return
     # First, so that a scheduler that does not answer leaves no file behind.
     with cluster.connect(workers, scheduler) if workers or scheduler else nullcontext() as client:
-        store = Store(Path(path), plan, chunk_rows(plan.scene, plan.setup))
-        spans, told = store.spans, progress or (lambda _: None)
+        store = Store(path, plan, rows)
+        spans = store.spans
         done = plan.rows - sum(last - first for first, last in spans)
         told(done)
         with closing(in_threads(work, spans) if client is None else cluster.on_cluster(client, plan, spans)) as found:

@@ -33,10 +33,16 @@ class ExternalForce(NamedTuple):
     changes: Callable[[int], Sequence[int]]  # ascending ticks of the run, in (0, n), at which it may change, from n
 
     def over(self, ticks: NDArray[np.int64]) -> Array:
-        """Values (n,) in N from each of the ascending ticks (n,) on, asked for only where it may change."""
+        """Values (n,) in N from each of the ascending ticks (n,) on, asked for only where it may change.
+
+        Or at the ticks themselves, between which there may be more changes than memory holds.
+        """
+        if not len(ticks):
+            return np.zeros(0)
         first, last = int(ticks[0]), int(ticks[-1])
         changes = self.changes(last + 1)
-        at = [first, *changes[bisect_right(changes, first) : bisect_right(changes, last)]]
+        changes = changes[bisect_right(changes, first) : bisect_right(changes, last)]
+        at = [first, *changes] if len(changes) < len(ticks) else ticks.tolist()
         values = np.array([self.at(tick) for tick in at])
         return values[np.searchsorted(at, ticks, side="right") - 1]
 

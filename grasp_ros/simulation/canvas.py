@@ -48,7 +48,7 @@ def style(own: Mapping[str, Any] | None = None) -> Iterator[None]:
 
 def label(name: str, unit: str) -> str:
     """An outcome with its unit."""
-    return ", ".join([name.replace("_", " "), unit]).removesuffix(", 1")
+    return f"{name.replace('_', ' ')}, {unit}".removesuffix(", 1")
 
 
 def formats() -> list[str]:

@@ -17,7 +17,6 @@ from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.simulation.quantities import as_row
 from grasp_ros.simulation.repeat import at_every_tick
-from grasp_ros.simulation.ticks import tick_of
 from grasp_ros.simulation.trajectory import Trajectory, check_run
 
 
@@ -76,17 +75,12 @@ def external_work(run: Trajectory, row: Mapping[str, float] | None) -> float:
     """Work of the external forces in J, over what `losses_of` is of."""
     if row is not None and not run.sampled:
         return row["work_inputs"]
-    return float((_external(run) * _moves(run)).sum())
+    return float((run.external[:-1] * _moves(run)).sum())
 
 
 def _moves(run: Trajectory) -> Array:
     """How far the bodies LEFT, RIGHT, OBJECT come from output to output, (n - 1, 3) in m; 0 for an absent one."""
     return np.diff(np.nan_to_num(run.state[:, [COLUMN[body] for body in Body]]), axis=0)
-
-
-def _external(run: Trajectory) -> Array:
-    """The external forces meanwhile, (n - 1, 3) in N."""
-    return run.scene.system.external_over(tick_of(run.scene, run.t[:-1])) if len(run.t) > 1 else np.zeros((0, 3))
 
 
 def losses_of(run: Trajectory, row: Mapping[str, float] | None) -> Losses:

@@ -119,25 +119,20 @@ class Trajectory(Tabular, Frozen):
         """
         if self.loop is not None:
             return self.loop.inputs
-        inputs = self._external
+        inputs = self.external
         inputs[:, [LEFT, RIGHT]] += self.command
         inputs[tick_of(self.scene, self.t) == self.scene.ticks] = np.nan
         return inputs
 
     @property
-    def _external(self) -> Array:
+    def external(self) -> Array:
         """External forces (n, 3) in N, by body, from each output time to the next tick."""
-        system = self.scene.system
-        if not system.external:
-            return np.zeros((len(self.t), 3))
-        # At these ticks alone: between them there may be more than memory holds.
-        ticks, place = np.unique(tick_of(self.scene, self.t), return_inverse=True)
-        return np.reshape([system.external_at(tick) for tick in ticks.tolist()], (-1, 3))[place]
+        return self.scene.system.external_over(tick_of(self.scene, self.t))
 
     @property
     def energy(self) -> Energy:
         """V, V_c, V' and the contact mode at the output times; see `energy_of`."""
-        return energy(self.scene.system, self.state, self._external, feedback=not self.controllers)
+        return energy(self.scene.system, self.state, self.external, feedback=not self.controllers)
 
     @property
     def energy_of(self) -> str:

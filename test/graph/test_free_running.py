@@ -136,7 +136,7 @@ def test_a_bag_tells_for_how_long_a_command_was_missing(grasp_run: Any, tmp_path
     out, err = run.communicate(timeout=DEADLINE)
     assert "no command that answers a state of the last 0.1 s" in err
     late = bag.read(tmp_path / "run" / "bag").timed_out["left"]
-    assert 300 < late < 3000  # all but nothing, where the machine was too busy for the law to be heard
+    assert 300 < late < 2500
     for text in (out, command("inspect", "run/bag").stdout):
         assert re.search(rf"timed out +left for {late} periods, in which its last command was older than", text)
 

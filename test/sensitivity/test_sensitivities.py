@@ -146,6 +146,9 @@ def test_a_run_of_something_else_has_no_derivatives() -> None:
             simulate(scene, sensitivity=[P], **settings)
     with pytest.raises(Refused, match="with the scene's own controllers"):
         differentiate(simulate(scene, sampled=True, changes=change), [P])
+    alone = {250: {"left_feedback.velocity_gain_Ns_per_m": 5.0}}
+    with pytest.raises(Refused, match="with the scene's own controllers"):  # no event tells
+        differentiate(simulate(horizon("arm_alone", 1.0), sampled=True, changes=alone), ["left_arm.mass_kg"])
     with pytest.raises(Refused, match="work"):
         simulate(scene, sensitivity=[P], max_work=10)
     with pytest.raises(Refused, match="sensitivity: nothing; allowed: numbers of the scene"):

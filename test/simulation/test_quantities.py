@@ -102,6 +102,10 @@ def test_forces_of_a_run_with_changes_are_its_own() -> None:
     assert summary(run)["largest_N"]["input_left"] == np.abs(run.command[:, 0]).max() > 50.0
     assert run.energy_of == PLANT_ALONE  # nobody knows V_c of gains that change
     assert run.energy.V_c.tolist() == energy(scene.system, run.state, feedback=False).V_c.tolist()
+    assert run.energy.V_c[0] == pytest.approx(10.0 * 0.3**2 + 10.0 * 0.5**2)  # the springs of the arms
+    early = simulate(scene, sampled=True, changes={3000: stiff[100]}, grid=[0.0, 1.0, 2.0])
+    with pytest.raises(Refused, match="its controllers cannot be asked again"):
+        losses(early)
 
 
 def test_losses_of_a_run_that_cannot_be_repeated_are_refused() -> None:
