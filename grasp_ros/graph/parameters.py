@@ -22,7 +22,7 @@ MONITORED: Settings = {
 }
 FREE: Settings = {  # exist with the wall clock
     "real_time_factor": (1.0, "simulated seconds in a second"),
-    "wait_for_controllers": (False, "start only when somebody sends the commands of each controller"),
+    "wait_for_controllers": (False, "start the clock only when each controller has sent a command"),
     "left_timeout_s": (0.1, TIMEOUT), "left_on_timeout": ("zero", ON_TIMEOUT),
     "right_timeout_s": (0.1, TIMEOUT), "right_on_timeout": ("zero", ON_TIMEOUT),
 }

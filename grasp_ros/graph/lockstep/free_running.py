@@ -53,10 +53,11 @@ class Held:
 
 
 class FreeRunning:
-    """Advances the plant with the wall clock; if it `waits`, from when somebody sends the commands of each side."""
+    """Advances the plant with the wall clock; if it `waits`, from when each side has sent a command."""
 
     def __init__(self, plant: Plant, steering: Steering, running: Running, waits: bool) -> None:
-        self._plant, self._steering, self._running, self._awaits = plant, steering, running, waits
+        self._plant, self._steering, self._running = plant, steering, running
+        self._awaits = waits and bool(plant.scene.controllers)
         self.answered = False  # whether all sides have answered a state of this run
         self.topics: list[Topic] = []  # of which it needs each message
         self._period = plant.scene.period_ns / NANOSECONDS / running.real_time_factor  # s of wall time
@@ -81,16 +82,20 @@ class FreeRunning:
         return [topic.name for topic in topics if not self._plant.writers(topic)]
 
     def needs(self) -> Iterator[Need]:
-        """The monitor alone: commands have timeouts of their own."""
+        """The monitor, and first commands where it waits for them; later ones have timeouts of their own."""
+        if self._awaits:
+            for topic in self._plant.scene.controllers.values():
+                yield Need(topic, Gone.AS_TOLD, what="first command", due=self._plant.asked, first=True)
         if self._plant.monitored:
             yield Need(LYAPUNOV, Gone.ENDS)
 
     def ask_again(self, now: float) -> None:
-        """Never: the wall clock goes on."""
+        """Publish the first state again while it waits for an answer; then the wall clock goes on."""
+        if self._awaits:
+            self._plant.repeat()
 
     def start(self) -> None:
-        """Begin at the current tick."""
-        self._set_anchor()
+        """Look at the clock from now on; it runs once nobody is waited for."""
         self._plant.wall_timer(max(self._period / LOOKS, SHORTEST_SECONDS), self.advance)
 
     def _set_anchor(self) -> None:
@@ -107,13 +112,16 @@ class FreeRunning:
         elif self._limits.admit(topic, cdr):
             held.force, held.answers, held.ever = force, tick, True
             self.answered = self.answered or all(own.ever for own in self._held.values())
+            self._awaits = self._awaits and not self.answered
             self.advance()
 
     def advance(self) -> None:
         """Compute the periods that are over."""
         plant = self._plant
-        if plant.finished or math.isnan(self._anchor):
+        if plant.finished or not plant.begun or self._awaits:
             return
+        if math.isnan(self._anchor):
+            self._set_anchor()
         if self._steering.reset_due:
             self._held = {side: Held() for side in self._held}
             self._steering.reset_done()
