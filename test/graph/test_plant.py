@@ -22,6 +22,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from grasp_ros import scene
+from grasp_ros.graph import bag
 from grasp_ros.graph.ros import messages
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, SCENE
 from grasp_ros.simulation import simulate
@@ -31,6 +32,7 @@ from lab.reference.grasp import commands
 pytestmark = pytest.mark.slow  # real processes
 
 
+GAIN = "left_feedback.position_gain_N_per_m"
 REFUSED = [
     ("plant", "-p scene:=case_99", "case_99: no such scene"),
     ("plant", "-p scene:=missing.yaml", "missing.yaml: no such file"),
@@ -96,6 +98,20 @@ def test_a_file_of_parameters_for_another_node_is_named(launch: Any, tmp_path: P
     plant.terminate()
     plant.communicate(timeout=DEADLINE)
     assert first.endswith("[plant]: no parameter file has anything for /plant\n")
+
+
+def test_one_file_of_parameters_is_for_all_nodes(launch: Any, tmp_path: Path) -> None:
+    numbers = {"scene": "arm_alone", "time.duration_s": 0.1, GAIN: 31.0, "bag": "bag", "wait_for_monitor": True}
+    (tmp_path / "file.yaml").write_text(json.dumps({"/**": {"ros__parameters": numbers}}))
+    nodes = [launch(*START, name, "--ros-args", "--params-file", "file.yaml", cwd=tmp_path, stderr=subprocess.PIPE)
+             for name in ("plant", "monitor", "left_controller")]
+    errors = [node.communicate(timeout=DEADLINE)[1] for node in nodes[:2]]
+    assert [node.returncode for node in nodes] == [0, 0, None], errors  # a controller waits for the next plant
+    nodes[2].terminate()
+    nodes[2].communicate(timeout=DEADLINE)
+    recording = bag.read(tmp_path / "bag")
+    assert recording.scene.duration == 0.1
+    assert recording.changes == {0: {GAIN: 31.0}}
 
 
 def test_the_plant_logs_what_its_scene_can_hardly_mean(launch: Any, tmp_path: Path) -> None:

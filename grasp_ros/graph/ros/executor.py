@@ -58,7 +58,7 @@ def _live(
         try:
             for names, make in makes.items():  # noqa: B007 - which one is refused
                 nodes.append(make(context=context))
-                nodes[-1].refuse_unknown(numbers=False)
+                nodes[-1].refuse_unknown()
             note_signals(received)  # again: a law may have put its own reactions in their place
             names = together
             gc.freeze()  # what is there now stays; to look through it again and again costs a tick 0.1 s now and then

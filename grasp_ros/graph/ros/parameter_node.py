@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from array import array
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import chain
 from typing import Any
 
@@ -70,13 +70,14 @@ class ParameterNode(Node):
                     raise Refused(f"{name}: {found!r} is not allowed; allowed: {parameter.allowed}")
                 if (found := parameter.read(found)) != value:
                     given[name] = found
-        self.refuse_unknown()
+        self.refuse_unknown(scene)
         return given
 
-    def refuse_unknown(self, numbers: bool = True) -> None:
-        """Refuse what the start has given and nobody has declared; numbers of a scene too, if it is known by now."""
-        given = [name for name in self._parameter_overrides if numbers or "." not in name]
-        others = {*chain(*PARAMETERS.values())} if FILE in sys.argv else set()  # a file may be for all nodes
+    def refuse_unknown(self, scene: Scene | None = None) -> None:
+        """Refuse what the start has given and nobody has declared; numbers of a scene too, where there is one."""
+        given = [name for name in self._parameter_overrides if scene or "." not in name]
+        numbers = [f"{section}.{key}" for section, values in scene.values.items() for key in values] if scene else []
+        others = {*chain(*PARAMETERS.values(), numbers)} if FILE in sys.argv else set()  # a file may be for all nodes
         unknown = [name for name in given if not self.has_parameter(name) and name not in others]
         if unknown:  # rclpy itself would not say a word
             name, free = unknown[0], self._parameters.get("free_running")
@@ -90,9 +91,10 @@ class ParameterNode(Node):
             del self._parameters[name], self._descriptors[name]
 
     def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
-        """Set parameters; integers become floating-point numbers, and a refusal says why.
+        """Set parameters; what is meant as a floating-point number becomes one, and a refusal says why.
 
-        What is fixed may be set to what it is, so that a node takes its own dump.
+        What is fixed may be set to what it is, so that a node takes its own dump. `ros2 param load` sends 1e-14, which
+        has no point, as a text.
         """
         numbers = []
         for parameter in parameter_list:
@@ -100,14 +102,16 @@ class ParameterNode(Node):
             if not self.has_parameter(name):
                 why = f"no such parameter; {allowed(name, sorted(self._parameters))}"
                 return SetParametersResult(successful=False, reason=f"{name}: {why}")
-            declared = self.describe_parameter(name)
+            held, declared = _plain(self.get_parameter(name).value), self.describe_parameter(name)
+            if declared.dynamic_typing and type(held) in (int, float) and type(parameter.value) in (int, str):
+                with suppress(ValueError):
+                    parameter = RosParameter(name, value=float(parameter.value))
             if declared.read_only:
-                if _plain(parameter.value) == _plain(self.get_parameter(name).value):
+                if _plain(parameter.value) == held:
                     continue
                 why = self.why_read_only if "." in name else ParameterNode.why_read_only
                 return SetParametersResult(successful=False, reason=f"{name}: {why}")
-            whole = parameter.type_ == RosParameter.Type.INTEGER and declared.dynamic_typing
-            numbers.append(RosParameter(name, value=float(parameter.value)) if whole else parameter)
+            numbers.append(parameter)
         return super().set_parameters_atomically(numbers) if numbers else SetParametersResult(successful=True)
 
 
