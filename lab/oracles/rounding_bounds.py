@@ -9,7 +9,7 @@ import numpy as np
 
 from grasp_ros.exact.tolerances import REST, STILL
 from grasp_ros.physics.impact_law import stored_energy
-from grasp_ros.physics.layout import EPS, LEFT, OBJECT, Of, Work
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, Law, Of, Work
 from grasp_ros.physics.model import Array, Contact, impact_force
 from grasp_ros.simulation import Trajectory
 from lab.oracles.segments import FIRST, INNER, Detail
@@ -84,7 +84,7 @@ def sizes(detail: Detail) -> Sizes:
     touching, taken = np.zeros(len(own), dtype=bool), detail.bodies[..., Of.DAMPING].copy()
     for side in detail.run.scene.system.contacts:
         hertzian, loss = detail.run.scene.system.pairs[side]
-        u = ((1.0 if side == LEFT else -1.0) * (detail.x[..., side] - detail.x[..., OBJECT])).max(axis=1)
+        u = _closing(detail, side)[0].max(axis=1)
         touching |= u >= 0.0
         taken[:, [side, OBJECT]] += (loss * hertzian * np.maximum(u, 0.0) ** 1.5)[:, None]
     own = np.maximum(own, np.where(touching[:, None], own[..., OBJECT], 0.0)[..., None])
@@ -112,7 +112,11 @@ def at_rest(detail: Detail) -> tuple[Array, Array]:
     finite = np.where(np.isfinite(mass) & (mass > 0.0), mass, 1.0)
     with np.errstate(over="ignore"):
         springs = np.abs(stiffness) * x * (x + x[..., [OBJECT]])
-        energy = (finite * v * v + springs + 2.0 * np.abs(force) * x).sum(axis=-1).max(initial=0.0)
+        energy = (finite * v * v + springs + 2.0 * np.abs(force) * x).sum(axis=-1)
+        for side in detail.run.scene.system.contacts:
+            hertzian, u = detail.run.scene.system.pairs[side, Law.HERTZIAN], _closing(detail, side)[0]
+            energy += 2.0 * stored_energy(hertzian, np.maximum(np.nan_to_num(u), 0.0))
+        energy = energy.max(initial=0.0)
     slow = REST * np.sqrt(energy / finite)
     rests = v.max(axis=1, keepdims=True) <= slow
     far = REST * float(x.max(initial=0.0))
@@ -221,11 +225,14 @@ def _handed_on(detail: Detail, pair: Impacts) -> Array:
     return found
 
 
-def _impact(detail: Detail, size: Sizes, side: int) -> Impacts:
+def _closing(detail: Detail, side: int) -> tuple[Array, Array]:
+    """u in m and u' in m/s of a pair at all nodes, (8)."""
     sign = 1.0 if side == LEFT else -1.0
-    contact = Contact(*detail.run.scene.system.pairs[side])
-    u = sign * (detail.x[..., side] - detail.x[..., OBJECT])
-    d = sign * (detail.v[..., side] - detail.v[..., OBJECT])
+    return sign * (detail.x[..., side] - detail.x[..., OBJECT]), sign * (detail.v[..., side] - detail.v[..., OBJECT])
+
+
+def _impact(detail: Detail, size: Sizes, side: int) -> Impacts:
+    contact, (u, d) = Contact(*detail.run.scene.system.pairs[side]), _closing(detail, side)
     force = impact_force(contact, u, d)
     noise = EPS * (size.x[..., side] + size.x[..., OBJECT])
     noise_d = EPS * (size.v[..., side] + size.v[..., OBJECT])
