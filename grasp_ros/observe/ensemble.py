@@ -151,7 +151,7 @@ def go_on(door: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, me
     while seen[Seen.SETTLED] == UNDECIDED and done < limits.horizons and outcome == Outcome.DONE:
         loop.begins[0] = done * loop.lengths[0]
         outcome = run_row(door, driven, rows, i, room, limits)
-        call(room.out.observer[ADDRESS], room.out.observer[CONTEXT], FINISH, 0.0, 0.0, 0)
+        call(room.out.observer[ADDRESS], room.out.observer[CONTEXT], FINISH, 0.0, 0.0, 0.0, 0)
         done += 1
     loop.begins[0] = 0.0
     rows.touches[i, 0], rows.touches[i, 1] = left, right
@@ -170,12 +170,12 @@ def run_rows(door: Any, driven: tuple[Any, ...], rows: Rows, room: Room, memory:
             return i
         load_row(rows, i, room, memory)
         if room.out.observer[ADDRESS] != 0:
-            call(room.out.observer[ADDRESS], room.out.observer[CONTEXT], BEGIN, limits.settled, 0.0, 0)
+            call(room.out.observer[ADDRESS], room.out.observer[CONTEXT], BEGIN, limits.settled, 0.0, 0.0, 0)
         outcome = run_row(door, driven, rows, i, room, limits)
         for place in range(6):
             rows.state[i, place] = room.state.y[place]
         if room.out.observer[ADDRESS] != 0:
-            call(room.out.observer[ADDRESS], room.out.observer[CONTEXT], FINISH, 0.0, 0.0, 0)
+            call(room.out.observer[ADDRESS], room.out.observer[CONTEXT], FINISH, 0.0, 0.0, 0.0, 0)
             if outcome == Outcome.DONE and memory.switches[Switch.WANTED] & Wanted.SETTLING.value:
                 outcome = go_on(door, driven, rows, i, room, memory, limits)
             for place in range(memory.seen.shape[0]):

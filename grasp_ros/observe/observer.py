@@ -135,7 +135,7 @@ def finish(m: Memory) -> None:
 
 
 @door
-def observe(address: int, kind: int, t: float, s: float, degree: int) -> int:
+def observe(address: int, kind: int, t: float, s: float, unit: float, degree: int) -> int:
     """Remember what is wanted of a segment of t s, which has just ended; called by `callback.notify`.
 
     Before a run it is called with BEGIN and the part of the largest displacement that counts as settled; after it with
@@ -161,7 +161,7 @@ def observe(address: int, kind: int, t: float, s: float, degree: int) -> int:
     if bound:
         watch_bound(segment, seen, m.clock[2] + (m.clock[0] + m.clock[1]))
     if m.switches[Switch.LOSSES] != 0:
-        call(m.switches[Switch.LOSSES], address, kind, t, s, degree)
+        call(m.switches[Switch.LOSSES], address, kind, t, s, unit, degree)
     if wanted & Wanted.RISE.value:
         watch_level(m)
     for place in range(STATES):
@@ -170,7 +170,7 @@ def observe(address: int, kind: int, t: float, s: float, degree: int) -> int:
 
 
 @door
-def observe_losses(address: int, kind: int, t: float, s: float, degree: int) -> int:
+def observe_losses(address: int, kind: int, t: float, s: float, unit: float, degree: int) -> int:
     """Add the losses of a segment; a function of its own, so that only who asks for them waits for its compilation."""
     m = memory_at(address)
     add_losses(SegmentRecord(kind, t, s, degree, m), m.base, m.seen)
@@ -210,11 +210,11 @@ class RunObserver:
 
     def begin(self, bound: float) -> None:
         """Before a run; `bound` is the part of the largest displacement that counts as settled."""
-        observe(self._block.ctypes.data, BEGIN, float(bound), 0.0, 0)
+        observe(self._block.ctypes.data, BEGIN, float(bound), 0.0, 0.0, 0)
 
     def finish(self) -> None:
         """After a run."""
-        observe(self._block.ctypes.data, FINISH, 0.0, 0.0, 0)
+        observe(self._block.ctypes.data, FINISH, 0.0, 0.0, 0.0, 0)
 
 
 def settle(integrator: Integrator, run_observer: RunObserver, stretch: float, horizons: int) -> None:

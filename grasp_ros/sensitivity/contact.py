@@ -7,15 +7,12 @@ tangents are as smooth as the motion itself, through touch and release, and have
 
 from __future__ import annotations
 
-import math
-
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.compilation.vectors import HALF, add_product, highest, larger, load, load_half, spread_half, store
 from grasp_ros.exact.numerics.polynomial import INVERSE
-from grasp_ros.exact.numerics.roots import value_and_rate
 from grasp_ros.exact.records import Array
-from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Of, U, V, X
+from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Law, Of, U, V, X
 from grasp_ros.sensitivity.base_series import base_series, touches
 from grasp_ros.sensitivity.tangents import (
     BLOCK,
@@ -33,7 +30,6 @@ from grasp_ros.sensitivity.tangents import (
 
 MOST_HALVINGS = 200
 NEGLECTED = 4096.0 * EPS  # 1e-12 for a step; one digit more costs 5 %, as more steps are made in parts
-ROUGHLY = 2.0**-28  # of a step: what follows by Newton's iteration is below rounding
 FIRST = 6  # terms of a series, one of which is about its size
 
 
@@ -217,30 +213,3 @@ def shift(c: Array, n: int, s: float) -> None:
         for i in range(LANES * (n - 1), LANES * first - 1, -LANES):
             above = load(c, i) + s * above
             store(c, i, above)
-
-
-@kernel
-def variable_at(c: Array, n: int, s: float, total: float, tau: float) -> float:
-    """The s within a step's length at which its time is tau; `total` is the time at that length.
-
-    By Newton's iteration with bisection, from the parabola through both ends.
-    """
-    slope, low, high = c[LANES + Lane.TIME], 0.0, s
-    bend = (total - slope * s) / (s * s)
-    root = slope + math.sqrt(max(slope * slope + 4.0 * bend * tau, 0.0))
-    at = 2.0 * tau / root if root > 0.0 else high  # 0 at the begin of a touch
-    if not at < high:
-        at = 0.5 * high
-    for _ in range(MOST_HALVINGS):
-        time, pace, _ = value_and_rate(c[Lane.TIME :: LANES], n, at)
-        if time > tau:
-            high = at
-        else:
-            low = at
-        following = at + (tau - time) / pace if pace > 0.0 else math.inf
-        if not low <= following <= high:
-            following = 0.5 * (low + high)
-        if abs(following - at) <= ROUGHLY * s:
-            return following
-        at = following
-    return at

@@ -10,96 +10,123 @@ Source: N. J. Higham, Functions of Matrices (SIAM 2008), sections 10.3 (scaling 
 from __future__ import annotations
 
 import math
+from enum import IntEnum
 
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import kernel
-from grasp_ros.exact.compilation.vectors import HALF, load_half, store
+from grasp_ros.exact.compilation.vectors import HALF, load_half, spread_half, store
 from grasp_ros.exact.impact import elastic_force, elastic_slope
+from grasp_ros.exact.numerics.polynomial import INVERSE
+from grasp_ros.exact.numerics.powers_of_two import exponent, power_of_two
 from grasp_ros.exact.records import Array
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, U, V
 from grasp_ros.sensitivity.tangents import STATES, TangentMotion, TangentRates, copy_matrix
 
 SERIES = 16  # terms of an exponential whose argument is below LARGEST_ARGUMENT
 LARGEST_ARGUMENT = 0.25
-SMALL = 1e-20  # terms of a flow behind which those of its derivatives are below rounding, too
-FLOW, BY_STIFFNESS, BY_DAMPING, NEXT, SPARE = range(5)  # matrices
-STEADY = 2  # column of what a constant acceleration of 1 m/s^2 does
+FEW, SHORT = 10, 2.0**-9  # terms are enough for the derivatives, too, where the argument is below this
+Row3 = tuple[float, float, float]
+
+
+class Flow(IntEnum):
+    """Places of the numbers of a body, each HALF behind the last: of its flow, and of the derivatives of these.
+
+    They are x by x, x by v, v by v, and x by a constant acceleration. That is v by x / -K, and v by the acceleration,
+    too, with the second one.
+    """
+
+    BY_STIFFNESS = 4
+    BY_DAMPING = 8
+    STIFFNESS = 12  # K itself, 1/s^2
+    DAMPING = 13  # C, 1/s
+    TIMES = 14  # how often the time was halved
+    TIME = 15  # what is left of it, s
 
 
 @kernel
 def halvings(rate: float, t: float) -> int:
     """How often a time in s is halved until an exponential series of so few terms covers it."""
-    reach = rate * t / LARGEST_ARGUMENT
-    return max(math.ceil(math.log2(reach)), 0) if reach > 1.0 else 0
+    return max(exponent(rate * t / LARGEST_ARGUMENT) + 1, 0)
 
 
 @kernel
-def product_2x3(a: Array, b: Array, out: Array, steady: float) -> None:
-    """Add a b to out, for affine maps (2, 3) of the plane; `steady` is the last row's own entry of b."""
-    for i in range(2):
-        for j in range(3):
-            out[i, j] += a[i, 0] * b[0, j] + a[i, 1] * b[1, j]
-        out[i, STEADY] += steady * a[i, STEADY]
-
-
-@kernel
-def write_map(out: Array, x: tuple[float, float, float], v: tuple[float, float, float]) -> None:
-    """Write an affine map of the plane, (2, 3): its rows for x and for v."""
-    for j in range(3):
-        out[0, j], out[1, j] = x[j], v[j]
-
-
-@kernel
-def flow_of_body(stiffness: float, damping: float, t: float, m: Array) -> None:
-    """Write the flow of a body over t s and its derivatives by K and C to the matrices (5, 6, 6), (2, 3) of each.
+def write_flows(motion: TangentMotion, t: float, flows: Array) -> None:
+    """Write the flows of all bodies, but for as many halvings of t s as a series needs, to `flows`, see `Flow`.
 
     All of it follows from the answer q(t) to an acceleration of 1, q'' = 1 - K q - C q', and its derivatives.
     """
-    times = halvings(max(math.sqrt(stiffness), abs(damping)), t)
-    h = t / 2.0**times
-    x = v = x_k = v_k = x_c = v_c = 0.0  # terms of q and q'
-    q = s = q_k = s_k = q_c = s_c = 0.0  # their sums
-    push = 1.0
-    for k in range(1, SERIES):
-        share = h / k
-        x_k, v_k = share * v_k, share * (-x - stiffness * x_k - damping * v_k)
-        x_c, v_c = share * v_c, share * (-v - stiffness * x_c - damping * v_c)
+    longest = 0.0
+    for body in (LEFT, OBJECT, RIGHT):
+        row, own = motion.bodies[body], flows[body::HALF]
+        own[Flow.STIFFNESS], own[Flow.DAMPING] = row[Of.STIFFNESS] / row[Of.MASS], row[Of.DAMPING] / row[Of.MASS]
+        rate = max(math.sqrt(own[Flow.STIFFNESS]), abs(own[Flow.DAMPING]))
+        times = halvings(rate, t)
+        own[Flow.TIMES], own[Flow.TIME] = times, t * power_of_two(-times)
+        longest = max(longest, rate * own[Flow.TIME])
+    nothing, push, h = spread_half(0.0), spread_half(1.0), load_half(flows, HALF * Flow.TIME)
+    stiffness, damping = load_half(flows, HALF * Flow.STIFFNESS), load_half(flows, HALF * Flow.DAMPING)
+    x = v = x_k = v_k = x_c = v_c = nothing  # terms of q and q'
+    q = s = q_k = s_k = q_c = s_c = nothing  # their sums
+    for k in range(1, SERIES if longest > SHORT else FEW):
+        share = INVERSE[k] * h
+        x_k, v_k = share * v_k, share * (nothing - x - stiffness * x_k - damping * v_k)
+        x_c, v_c = share * v_c, share * (nothing - v - stiffness * x_c - damping * v_c)
         x, v = share * v, share * (push - stiffness * x - damping * v)
         q, s, q_k, s_k, q_c, s_c = q + x, s + v, q_k + x_k, s_k + v_k, q_c + x_c, s_c + v_c
-        push = 0.0
-        if abs(v) <= SMALL * h and abs(x) <= SMALL * h * h and k > 4:
-            break
-    bend = stiffness * q + damping * s
-    bend_k, bend_c = q + stiffness * q_k + damping * s_k, s + stiffness * q_c + damping * s_c
-    write_map(m[FLOW], (1.0 - stiffness * q, s, q), (-stiffness * s, 1.0 - bend, s))
-    write_map(m[BY_STIFFNESS], (-q - stiffness * q_k, s_k, q_k), (-s - stiffness * s_k, -bend_k, s_k))
-    write_map(m[BY_DAMPING], (-stiffness * q_c, s_c, q_c), (-stiffness * s_c, -bend_c, s_c))
-    for _ in range(times):
-        for which in (BY_DAMPING, BY_STIFFNESS, FLOW):
-            m[NEXT, :2, :3] = 0.0
-            product_2x3(m[which], m[FLOW], m[NEXT], 1.0)
-            if which != FLOW:
-                product_2x3(m[FLOW], m[which], m[NEXT], 0.0)
-            copy_matrix(m[which], m[NEXT, :2, :3])
+        push = nothing
+    a, a_k, a_c = 1.0 - stiffness * q, nothing - q - stiffness * q_k, nothing - stiffness * q_c
+    d, d_k, d_c = a - damping * s, a_k - damping * s_k, a_c - s - damping * s_c
+    for place, number in enumerate((a, s, d, q, a_k, s_k, d_k, q_k, a_c, s_c, d_c, q_c)):
+        store(flows, HALF * place, number)
 
 
 @kernel
-def fly_tangent(motion: TangentMotion, rates: TangentRates, m: Array, body: Body, span: float) -> None:
-    """Write the tangents of a body after `span` s of flight to `at`."""
+def double_flow(f: Array) -> None:
+    """Double the time of a body's flow as often as it was halved: it is squared."""
+    stiffness = f[Flow.STIFFNESS]
+    a, s, d, q, a_k, s_k, d_k, q_k, a_c, s_c, d_c, q_c = (
+        f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8], f[9], f[10], f[11])
+    for _ in range(int(f[Flow.TIMES])):
+        both, bend, square = a + d, 2.0 * stiffness * s, s * s
+        q_k, q_c = q_k + a * q_k + q * a_k + 2.0 * s * s_k, q_c + a * q_c + q * a_c + 2.0 * s * s_c
+        q = q + a * q + square
+        s_k, s_c, later_k, later_c = s_k * both + s * (a_k + d_k), s_c * both + s * (a_c + d_c), bend * s_k, bend * s_c
+        a_k, d_k = 2.0 * a * a_k - square - later_k, 2.0 * d * d_k - square - later_k
+        a_c, d_c = 2.0 * a * a_c - later_c, 2.0 * d * d_c - later_c
+        a, d, s = a * a - stiffness * square, d * d - stiffness * square, s * both
+    f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8], f[9], f[10], f[11] = (
+        a, s, d, q, a_k, s_k, d_k, q_k, a_c, s_c, d_c, q_c)
+
+
+@kernel
+def fly_tangent(motion: TangentMotion, rates: TangentRates, flows: Array, body: Body) -> None:
+    """Write the tangents of a body in flight to `at`, after the time of the flows."""
+    f, v = flows[body::HALF], velocity_lane(body)
+    double_flow(f)
+    stiffness, first, second, third = f[Flow.STIFFNESS], f[:4], f[Flow.BY_STIFFNESS:], f[Flow.BY_DAMPING:]
+    write_tangent(motion, rates, body, v - 1, (first[0], first[1], first[3]), (second[0], second[1], second[3]),
+                  (third[0], third[1], third[3]))
+    write_tangent(motion, rates, body, v, (-stiffness * first[1], first[2], first[1]),
+                  (-first[1] - stiffness * second[1], second[2], second[1]),
+                  (-stiffness * third[1], third[2], third[1]))
+
+
+@kernel
+def write_tangent(motion: TangentMotion, rates: TangentRates, body: Body, lane: int, flow: Row3, stiffer: Row3,
+                  slower: Row3) -> None:
+    """Write the tangents of one lane: its flow, from x, v and a constant acceleration, and derivatives by K and C."""
     row, own, v = motion.bodies[body], rates.acting[body], velocity_lane(body)
     mass, x_0, v_0 = row[Of.MASS], motion.before[v - 1], motion.before[v]
     stiffness, damping, steady = row[Of.STIFFNESS] / mass, row[Of.DAMPING] / mass, row[Of.FORCE] / mass
-    flow_of_body(stiffness, damping, span, m)
-    for i in range(2):
-        by_x, by_v, by_steady = m[FLOW, i, 0], m[FLOW, i, 1], m[FLOW, i, STEADY] / mass
-        by_k = (m[BY_STIFFNESS, i, 0] * x_0 + m[BY_STIFFNESS, i, 1] * v_0 + m[BY_STIFFNESS, i, STEADY] * steady) / mass
-        by_c = (m[BY_DAMPING, i, 0] * x_0 + m[BY_DAMPING, i, 1] * v_0 + m[BY_DAMPING, i, STEADY] * steady) / mass
-        by_mass = by_k * stiffness + by_c * damping + by_steady * steady
-        for first in range(0, rates.x.shape[1], HALF):
-            moved = by_x * load_half(rates.x[v - 1], first) + by_v * load_half(rates.x[v], first)
-            stiffer = by_k * load_half(own[Of.STIFFNESS], first) + by_c * load_half(own[Of.DAMPING], first)
-            driven = by_steady * load_half(own[Of.FORCE], first) - by_mass * load_half(own[Of.MASS], first)
-            store(rates.at[v - 1 + i], first, moved + stiffer + driven)
+    by_x, by_v, by_steady = flow[0], flow[1], flow[2] / mass
+    by_k = (stiffer[0] * x_0 + stiffer[1] * v_0 + stiffer[2] * steady) / mass
+    by_c = (slower[0] * x_0 + slower[1] * v_0 + slower[2] * steady) / mass
+    by_mass = by_k * stiffness + by_c * damping + by_steady * steady
+    for first in range(0, rates.x.shape[1], HALF):
+        moved = by_x * load_half(rates.x[v - 1], first) + by_v * load_half(rates.x[v], first)
+        stiffened = by_k * load_half(own[Of.STIFFNESS], first) + by_c * load_half(own[Of.DAMPING], first)
+        driven = by_steady * load_half(own[Of.FORCE], first) - by_mass * load_half(own[Of.MASS], first)
+        store(rates.at[lane], first, moved + stiffened + driven)
 
 
 @kernel
@@ -163,7 +190,7 @@ def rest_tangent(motion: TangentMotion, rates: TangentRates, m: Array, span: flo
     """Write the tangents after `span` s at rest to `at`."""
     a, flow, integral, term, spare = m[0], m[1], m[2], m[3], m[4]
     times = halvings(rate_at_rest(motion, a), span)
-    h = span / 2.0**times
+    h = span * power_of_two(-times)
     flow[:] = integral[:] = term[:] = 0.0  # exp(a t) and its integral
     for i in range(STATES):
         flow[i, i] = term[i, i] = 1.0

@@ -17,13 +17,14 @@ from grasp_ros.exact.compilation.jit import door, kernel
 from grasp_ros.exact.driver.callback import FINISH, REST
 from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, surface_factor
+from grasp_ros.exact.numerics.polynomial import invert_time
 from grasp_ros.exact.numerics.roots import value_and_rate
-from grasp_ros.exact.records import Array
+from grasp_ros.exact.records import Array, Order, Step
 from grasp_ros.exact.tolerances import SURFACE
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, Slide, U, V, X
 from grasp_ros.sensitivity.base_series import touches
-from grasp_ros.sensitivity.contact import exact_length, expand_tangents, shift, step_tangents, variable_at
-from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent
+from grasp_ros.sensitivity.contact import exact_length, expand_tangents, shift, step_tangents
+from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent, write_flows
 from grasp_ros.sensitivity.held import act, enter_tick
 from grasp_ros.sensitivity.tangents import (
     UNSEEN,
@@ -190,9 +191,10 @@ def add_neglected(motion: TangentMotion, moved: Array, side: Body, span: float) 
 @kernel
 def fly_free(t: Tangents, presses: bool, tau: float) -> None:
     """Write the tangents of the bodies that touch nothing after tau s of a segment to `at`."""
+    write_flows(t.motion, tau, t.flows)
     for body in (LEFT, OBJECT, RIGHT):
         if not (presses and touches(t.motion, body)):
-            fly_tangent(t.motion, t.rates, t.matrices, body, tau)
+            fly_tangent(t.motion, t.rates, t.flows, body)
 
 
 @kernel
@@ -205,9 +207,10 @@ def pass_flight(t: Tangents, begin: float, span: float) -> None:
 
 
 @kernel
-def pass_step(t: Tangents, begin: float, span: float, s: float, n: int) -> None:
+def pass_step(t: Tangents, begin: float, span: float, s: float, unit: float, n: int) -> None:
     """Move the tangents over a Taylor step, in parts where their series end later than those of the run."""
     motion, rates, left = t.motion, t.rates, s
+    step = Step(Order(n, 0.0, 0), unit, touches(motion, LEFT), touches(motion, RIGHT))
     while True:
         expand_tangents(motion, rates, t.table, n)
         part = exact_length(motion, t.table, n, left)
@@ -216,7 +219,8 @@ def pass_step(t: Tangents, begin: float, span: float, s: float, n: int) -> None:
         while next_output(t.outputs) < (t.outputs.numbers[Number.TIME] if ends else begin + reached):
             tau = since(t.outputs, begin, span)
             fly_free(t, True, tau)
-            step_tangents(motion, rates, t.table, n, variable_at(motion.c, n, part, reached, tau))
+            at = invert_time(motion.c, t.table.products[0], step, tau, part, reached)
+            step_tangents(motion, rates, t.table, n, at)
             write_output(motion, t.outputs, rates)
         if ends:
             fly_free(t, True, span)
@@ -230,13 +234,13 @@ def pass_step(t: Tangents, begin: float, span: float, s: float, n: int) -> None:
 
 
 @kernel
-def pass_segment(t: Tangents, kind: int, begin: float, span: float, s: float, n: int) -> None:
+def pass_segment(t: Tangents, kind: int, begin: float, span: float, s: float, unit: float, n: int) -> None:
     """Move the tangents over a segment."""
     act(t.motion.mode, t.rates, t.inputs)
     if kind == Kind.FLIGHT:
         pass_flight(t, begin, span)
     else:
-        pass_step(t, begin, span, s, n)
+        pass_step(t, begin, span, s, unit, n)
     while next_output(t.outputs) <= t.outputs.numbers[Number.TIME]:  # events are: each ends its segment
         write_output(t.motion, t.outputs, t.rates)
     copy_matrix(t.rates.x, t.rates.at)
@@ -255,7 +259,7 @@ def remember(t: Tangents) -> None:
 
 
 @door
-def propagate(address: int, kind: int, span: float, s: float, degree: int) -> int:
+def propagate(address: int, kind: int, span: float, s: float, unit: float, degree: int) -> int:
     """Carry the tangents over a segment, which has just ended; called by `callback.notify`.
 
     After a run it is called with FINISH and the time of its end.
@@ -276,6 +280,6 @@ def propagate(address: int, kind: int, span: float, s: float, degree: int) -> in
             write_output(t.motion, t.outputs, t.rates)
         return 0
     t.outputs.numbers[Number.TIME] = (clock[0] + clock[1]) + clock[2]
-    pass_segment(t, kind, begin, span, s, degree)
+    pass_segment(t, kind, begin, span, s, unit, degree)
     remember(t)
     return 0

@@ -67,7 +67,7 @@ class Carrier:
     def finish(self, time: float) -> None:
         """After a run, at its end in s."""
         address_of(propagate)
-        propagate(self._block.ctypes.data, FINISH, float(time), 0.0, 0)
+        propagate(self._block.ctypes.data, FINISH, float(time), 0.0, 0.0, 0)
 
     @property
     def corner(self) -> float | None:

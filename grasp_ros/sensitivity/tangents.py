@@ -31,6 +31,7 @@ BLOCK = STEP * TERMS
 ODD = LANES * HALF  # sums of one coefficient: of the states, and of the two pairs
 SUMS = 2 * ODD  # of one of even order and of the next one
 WEIGHTS = HALF * TERMS
+FLOWS = 16 * HALF  # numbers of the flows of all bodies
 AHEAD = 8  # orders that `base_series.multiply` finds at a time
 ROOM = HALF * (TERMS + 2 * AHEAD)  # of four series for it
 COLUMNS = len(Column)
@@ -142,6 +143,7 @@ class Tangents(NamedTuple):
     inputs: Inputs
     outputs: TangentOutputs
     matrices: Array  # (5, 6, 6) scratch
+    flows: Array  # (FLOWS,) scratch, see `flight.Flow`
 
 
 def _padded(array: Array) -> Array:
@@ -167,7 +169,7 @@ def tangents_of(plant: Plant, state: State, changes: Directions, times: Array, e
     inputs = Inputs(changes.bodies, np.zeros((3, n)), changes.coulomb[0], np.zeros((2, COLUMNS)),
                     np.zeros((2, COLUMNS, n)), np.zeros((1, 2, 2)), np.zeros((0, 2, n)), changes.external)
     outputs = TangentOutputs(counts, numbers, times[order], order, np.zeros((m, STATES, n)), np.zeros((e, 3, 1 + n)))
-    return Tangents(motion, rates, table, inputs, outputs, np.zeros((5, STATES, STATES)))
+    return Tangents(motion, rates, table, inputs, outputs, np.zeros((5, STATES, STATES)), zeros(FLOWS))
 
 
 tangents_at = reader(typeof(tangents_of(*new_run()[2:], no_directions(1), np.zeros(0), 0)))

@@ -21,7 +21,7 @@ places_at = reader(typeof((np.zeros(0, dtype=np.int64),)))
 
 
 @cfunc(SIGNATURE)  # type: ignore[untyped-decorator]
-def read_clock(context: int, kind: int, t: float, s: float, degree: int) -> int:
+def read_clock(context: int, kind: int, t: float, s: float, unit: float, degree: int) -> int:
     """Note the kind of a segment, and when it was over."""
     place = places_at(context)[0]
     clock_gettime(MONOTONIC, place.ctypes.data)

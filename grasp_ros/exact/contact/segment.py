@@ -161,7 +161,7 @@ def cut_step(tables: Tables, plant: Plant, state: State, segment: Segment, ends:
         values(c, step.order.number, s, at)
     t = at[Lane.TIME]
     if t > span:
-        s, t = invert_time(tables, step, span, s, t), span
+        s, t = invert_time(c, at, step, span, s, t), span
         values(c, step.order.number, s, at)
     return Segment(segment.kind, t, s, step, segment.flights)
 
@@ -245,14 +245,14 @@ def move_by_step(tables: Tables, plant: Plant, segment: Segment, state: State) -
 @inlined
 def state_in_step(tables: Tables, segment: Segment, tau: float, row: Array) -> None:
     """Write positions and velocities after tau s of a step."""
-    at = tables.at
-    values(tables.c, segment.step.order.number, invert_time(tables, segment.step, tau, segment.s, segment.t), at)
+    c, at, step = tables.c, tables.at, segment.step
+    values(c, step.order.number, invert_time(c, at, step, tau, segment.s, segment.t), at)
     row[X.O], row[V.O] = at[X.O], at[V.O]
-    if segment.step.left:
+    if step.left:
         row[X.L], row[V.L] = at[X.O] + at[Z.L] * at[Z.L], at[V.L]
     else:
         row[X.L], row[V.L], _, _ = fly(segment.flights.left, tau)
-    if segment.step.right:
+    if step.right:
         row[X.R], row[V.R] = at[X.O] - at[Z.R] * at[Z.R], at[V.R]
     else:
         row[X.R], row[V.R], _, _ = fly(segment.flights.right, tau)

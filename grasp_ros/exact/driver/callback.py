@@ -20,15 +20,15 @@ from grasp_ros.exact.records import Integers, Segment
 
 ADDRESS, CONTEXT = 0, 1  # places of an observer
 FINISH, REST = -1, -3  # in place of a kind of segment: after a run, and where nothing moves in an interval
-SIGNATURE = int64(int64, int64, float64, float64, int64)
+SIGNATURE = int64(int64, int64, float64, float64, float64, int64)
 _FUNCTIONS: dict[int, Any] = {}  # where nothing is compiled
 _RECORDS: dict[int, Any] = {}  # likewise
 
 
-@instruction(lambda _, address, context, kind, t, s, degree: (int64(int64, *SIGNATURE.args), code_of_call))
-def call(address: int, context: int, kind: int | np.int64, t: float, s: float, degree: int) -> int:
-    """Call the function int64(int64, int64, float64, float64, int64) at an address."""
-    return int(_FUNCTIONS[int(address)](int(context), kind, t, s, degree))
+@instruction(lambda _, address, context, kind, t, s, unit, degree: (int64(int64, *SIGNATURE.args), code_of_call))
+def call(address: int, context: int, kind: int | np.int64, t: float, s: float, unit: float, degree: int) -> int:
+    """Call the function of this SIGNATURE at an address."""
+    return int(_FUNCTIONS[int(address)](int(context), kind, t, s, unit, degree))
 
 
 @cache
@@ -75,12 +75,13 @@ def reader(kind: Any) -> Any:
 def notify_rest(observer: Integers) -> None:
     """Call the observer where nothing moves."""
     if observer[ADDRESS] != 0:
-        call(observer[ADDRESS], observer[CONTEXT], REST, 0.0, 0.0, 0)
+        call(observer[ADDRESS], observer[CONTEXT], REST, 0.0, 0.0, 0.0, 0)
 
 
 @inlined
 def notify(observer: Integers, segment: Segment) -> None:
-    """Call the observer after a segment: with its kind, its length, where its series end, and their degree."""
+    """Call the observer after a segment: with its kind, its length, where its series end, their unit and degree."""
     if observer[ADDRESS] != 0:
-        call(observer[ADDRESS], observer[CONTEXT], np.int64(segment.kind), segment.t, segment.s,
-             segment.step.order.number)
+        step = segment.step
+        call(observer[ADDRESS], observer[CONTEXT], np.int64(segment.kind), segment.t, segment.s, step.unit,
+             step.order.number)

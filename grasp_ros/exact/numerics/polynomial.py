@@ -12,7 +12,7 @@ import numpy as np
 
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.compilation.vectors import add_product, load, sizes, store
-from grasp_ros.exact.records import Array, Step, Tables
+from grasp_ros.exact.records import Array, Step
 from grasp_ros.exact.tolerances import NOISE
 from grasp_ros.physics.layout import EPS, LANES, Lane, V, Z
 
@@ -67,14 +67,14 @@ def lane_range(c: Array, size: Array, lane: int, s: float, end: float) -> tuple[
 
 
 @inlined
-def invert_time(tables: Tables, step: Step, tau: float, high: float, total: float) -> float:
+def invert_time(c: Array, at: Array, step: Step, tau: float, high: float, total: float) -> float:
     """The s / unit in [0, high] at which the time since the begin of a step is tau; `total` is the time at high.
 
     dt = 2 G ds with G = w_l w_r of the sides in contact. Halley's iteration with bisection: its error is cubed each
     time, or squared where u' is little more than rounding, so a correction of 1e-8 is the last one needed. It starts
-    from the parabola through both ends.
+    from the parabola through both ends. `at` (2 LANES,) is scratch.
     """
-    c, at, n, unit = tables.c, tables.at, step.order.number, step.unit
+    n, unit = step.order.number, step.unit
     slope = c[LANES + Lane.TIME]
     bend = (total - slope * high) / (high * high)
     s = 2.0 * tau / (slope + math.sqrt(max(slope * slope + 4.0 * bend * tau, 0.0)))
