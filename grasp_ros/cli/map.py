@@ -90,7 +90,7 @@ def _map(options: argparse.Namespace) -> int:
     done = data["status"].values == DONE
     for outcome in columns:
         if outcome.wanted & Wanted.SETTLING and np.isnan(data[outcome.name].values[done]).any():
-            note(f"{outcome.name} is nan where V_c proves nothing; {scene.certificate_in_words(setup.sampled)};"
+            note(f"{outcome.name} is nan where V_c proves nothing; {scene.why_unsettled(setup.sampled)};"
                  " --outcome last_outside says how long a mass was outside")
     for column, path in pictures.items():
         figures.draw(data, plan, column, path)

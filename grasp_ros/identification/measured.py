@@ -85,13 +85,19 @@ def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> M
     else:
         path = Path(source)
         found = _of_trajectory(load(path), str(path))
-    return _checked(found if scene is None else found._replace(scene=scene, sampled=found.sampled or scene.sampled))
+    if scene is None:
+        return _checked(found)
+    if found.inputs is not None and scene.period_ns != found.scene.period_ns:
+        raise Refused(f"{found.name}: its inputs change every {found.scene.time_of(1):g} s; allowed: a scene with that"
+                      f" time.control_period_s, not {scene.time_of(1):g}")
+    return _checked(found._replace(scene=scene, sampled=found.sampled or scene.sampled))
 
 
 def _of_recording(recording: Recording, by_sensors: bool) -> Measured:
     name = str(recording.path)
     if not recording.whole:
-        raise Refused(f"{name}: allowed: a bag of one run from its begin, with all of its ticks")
+        why = f"{len(recording.starts) - 1} resets" if len(recording.starts) > 1 else "not all ticks of its run"
+        raise Refused(f"{name}: {why}; allowed: a bag of one run from its begin, with all of its ticks")
     others = [side for side, answers in answers_of(recording).items() if answers.differs]
     why_unknown = "numbers were set while it ran" if recording.changes else (
         "commands came by the wall clock" if not recording.running.lockstep else (

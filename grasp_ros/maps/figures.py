@@ -34,11 +34,19 @@ def draw(data: Any, plan: Plan, outcome: str, path: Path) -> None:
     figure.suptitle(plan.scene.title, fontsize="medium")
     if len(plan.axes) == 1:
         x = plan.axes[0]
+        missing = x.values[~np.isfinite(values)]
         axes.plot(x.values, values, ".", markersize=_dot(len(values)))
-        axes.set(xlabel=label_of(x.name), xscale=_scale(x), ylabel=label)
+        axes.plot(missing, np.zeros(len(missing)), "|", color=MISSING, transform=axes.get_xaxis_transform())
+        axes.set(xlabel=label_of(x.name), xscale=_scale(x), ylabel=label, xlim=edges(x)[[0, -1]])
+        _say_if_none(axes, values)
     else:
         heat(axes, plan, values, label)
     save(figure, path)
+
+
+def _say_if_none(axes: Axes, values: np.ndarray) -> None:
+    if not np.isfinite(values).any():
+        axes.text(0.5, 0.5, "no finite value", transform=axes.transAxes, ha="center")
 
 
 def heat(axes: Axes, plan: Plan, values: np.ndarray, label: str) -> None:
@@ -82,6 +90,7 @@ def _sample(data: Any, plan: Plan, values: np.ndarray, label: str, path: Path) -
     first.hist(values[finite], bins=min(BINS, max(FEWEST_BINS, finite.sum() // RUNS_IN_A_BIN)), color="#0072b2")
     first.set_xlabel(textwrap.fill(label, LETTERS))
     first.set_ylabel("runs")
+    _say_if_none(first, values)
     shown = np.flatnonzero(finite)[:SCATTERED]
     for axes, name in zip(others, strongest, strict=True):
         axes.plot(data[name].values[shown], values[shown], ".", markersize=_dot(len(shown)), color="#333333",

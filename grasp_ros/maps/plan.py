@@ -12,7 +12,7 @@ import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.given import number, read_number, truth, whole
+from grasp_ros.physics.given import number, read_number, text, truth, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.places import parameter_of
@@ -20,7 +20,7 @@ from grasp_ros.simulation.chunk import Setup, checked
 from grasp_ros.simulation.chunk import check as check_setup
 from grasp_ros.simulation.variants import Variants
 
-POINTS, MOST, MOST_AXES = 101, 10**9, 2
+POINTS, MOST, MOST_AXES, DIGITS = 101, 10**9, 2, 15
 
 
 class Axis(NamedTuple):
@@ -47,8 +47,11 @@ class Axis(NamedTuple):
 
     @property
     def values(self) -> Array:
-        """Values (points,) of a grid."""
-        return self.at(np.arange(self.points) / (self.points - 1))
+        """Values (points,) of a grid, decimals of 15 digits between its ends: 1.07, not 1.0699999999999998."""
+        values = self.at(np.arange(self.points) / (self.points - 1))
+        size = values if self.log else max(abs(self.low), abs(self.high))
+        scale = 10.0 ** (DIGITS - np.ceil(np.log10(size)))
+        return np.concatenate([[self.low], (np.round(values * scale) / scale)[1:-1], [self.high]])
 
 
 def read_axis(option: str, text: str, grid: bool = True) -> Axis:
@@ -82,8 +85,9 @@ class Plan:
     def __post_init__(self) -> None:
         """Numbers of Python's own, which a file takes."""
         axes = tuple(
-            Axis(name, number(f"{name}: low", low), number(f"{name}: high", high), whole(f"{name}: points", points, 2),
-                 truth(f"{name}: log", log)) for name, low, high, points, log in self.axes)
+            Axis(text("axes", name), number(f"{name}: low", low), number(f"{name}: high", high),
+                 whole(f"{name}: points", points, 2), truth(f"{name}: log", log))
+            for name, low, high, points, log in self.axes)
         own = {"setup": checked(self.setup), "axes": axes, "sample": whole("sample", self.sample, 0),
                "seed": whole("seed", self.seed, 0)}
         for name, value in own.items():
@@ -152,6 +156,8 @@ def check(plan: Plan) -> None:
         parameter = parameter_of(plan.scene, key)
         if parameter.whole:
             raise Refused(f"{plan.scene.name}: {key}: a whole number; allowed: numbers with a range")
+        if plan.sample and key.startswith("time."):  # nearly none that is drawn holds whole periods
+            raise Refused(f"{plan.scene.name}: {key}: a time in whole control periods; allowed: numbers of any size")
         for end in (axis.low, axis.high):
             if not parameter.accepts(end):
                 raise Refused(f"{plan.scene.name}: {key}: {end!r} is not allowed; allowed: {parameter.allowed}")

@@ -62,11 +62,10 @@ class DesignProblem:
         self.axes, self.setup = plan.axes, plan.setup
 
     def why_unsettled(self) -> str:
-        """Why no run is known to settle, where that is asked for and V_c may rise."""
-        asked = wanted_by(column for name in self.names for column in find([name])) & Wanted.SETTLING
-        if not (asked and self.scene.caveats(self.setup.sampled)):
+        """Why no run is known to settle, where that is asked for."""
+        if not wanted_by(column for name in self.names for column in find([name])) & Wanted.SETTLING:
             return ""
-        return f"; {self.scene.certificate_in_words(self.setup.sampled)}; last_outside needs no proof"
+        return f"; {self.scene.why_unsettled(self.setup.sampled)}; last_outside needs no proof"
 
     @cached_property
     def units(self) -> dict[str, str]:

@@ -139,6 +139,10 @@ class Scene(Frozen):
         caveats = self.caveats(sampled)
         return f"V_c may rise: {'; '.join(caveats)}" if caveats else "V_c cannot rise"
 
+    def why_unsettled(self, sampled: bool) -> str:
+        """Why V_c may not prove that a run settles."""
+        return self.certificate_in_words(sampled) if self.caveats(sampled) else "a mass may not be driven to 0"
+
     def time_of(self, tick: int) -> float:
         """Time of a tick in s: an integer number of ns, rounded once."""
         return tick * self.period_ns / NANOSECONDS

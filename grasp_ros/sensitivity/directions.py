@@ -19,6 +19,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import PAIR_COLUMNS, System
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import build
+from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.effects.force import FORCED
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.places import check_scene, parameter_of, place_of
@@ -114,9 +115,19 @@ def check_key(scene: Scene, key: str) -> Parameter:
         If the scene does not name it, or it does not enter smoothly.
     """
     parameter = parameter_of(scene, key)
+    if _is_off(scene, key):
+        raise Refused(f"{scene.name}: {key} has no derivative at 0: its effect is left out; allowed: a small number")
     if parameter.unit in NOT_SMOOTH or parameter.whole:
         raise Refused(f"{scene.name}: {key} has no derivative: {NOT_SMOOTH.get(parameter.unit, 'it is whole')}")
     return parameter
+
+
+def _is_off(scene: Scene, key: str) -> bool:
+    """Whether a number is 0 with which the system has no dry friction, or no noise, to differentiate."""
+    section, _, name = key.partition(".")
+    law = scene.system.laws.get(SIDES.get(section.removesuffix("_sensor"), -1))
+    return bool((name == "coulomb_N" and scene.system.coulomb == 0.0)
+                or ("noise" in name and law is not None and law.seed is None))
 
 
 def _difference(scene: Scene, key: str, parameter: Parameter, ticks: int) -> Iterator[Array]:

@@ -44,11 +44,11 @@ def spectrum(scene: Scene, *, accuracy: float = ACCURACY) -> Array:
     bodies = scene.system.closed_loop[scene.system.present]
     rate = max(1.0 / PIECE_S, float((bodies[:, Of.DAMPING] / bodies[:, Of.MASS]).max()) / DECAY)
     pieces = max(math.ceil(scene.duration * rate), 1)
-    while (grown := _growth(scene, places, accuracy, pieces)) is None:
-        pieces *= 2
+    while pieces > MOST_PIECES or (grown := _growth(scene, places, accuracy, pieces)) is None:
         if pieces > MOST_PIECES:
             raise Refused(f"{scene.name}: Lyapunov exponents: tangents fall below {FALL:g} of their length within"
-                          f" {2.0 * scene.duration / pieces:.3g} s; allowed: slower ones, or a shorter time.duration_s")
+                          f" {scene.duration / MOST_PIECES:.3g} s; allowed: slower ones, or a shorter time.duration_s")
+        pieces *= 2
     lost = np.full(len(places) - len(grown), -np.inf)
     return np.concatenate([np.sort(grown)[::-1] / scene.duration, lost])
 

@@ -23,13 +23,11 @@ from grasp_ros.sensitivity.event_times import Moments, event_rates
 from grasp_ros.sensitivity.run import Carrier
 from grasp_ros.simulation.chunk import Chunk, Setup
 from grasp_ros.simulation.closed_loop import drive
-from grasp_ros.simulation.outcomes import BY, CORNER, GROUPS, V_C_END
+from grasp_ros.simulation.outcomes import DIFFERENTIATED, derivatives_by
 from grasp_ros.simulation.repeat import check_same, integrator_of
 from grasp_ros.simulation.simulate import simulate
 from grasp_ros.simulation.trajectory import Trajectory
 from grasp_ros.simulation.variants import Variants
-
-DIFFERENTIATED = (*GROUPS["last_state"], V_C_END)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +96,7 @@ def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
     carrier.finish(scene.duration)
     m = len(grid)
     at_events = event_rates(scene, changes, sampled, events, Moments(states[m:], carrier.out[m:], carrier.forces))
-    states[:, system.absent_columns] = np.nan
+    states[:, system.absent_columns] = carrier.out[:, system.absent_columns] = np.nan
     check_same(run, grid, states[:m], integrator.event_table)
     return Sensitivity(scene, tuple(keys), grid, states[:m], events, carrier.out[:m], at_events, carrier.corner)
 
@@ -167,6 +165,5 @@ def with_derivatives(chunk: Chunk, variants: Variants, setup: Setup, keys: Seque
             continue
         rates[i], level[i] = np.vstack([found.state_rates[-1], found.V_c_rates[-1]]), found.V_c[-1]
         corner[i] = np.inf if found.corner is None else found.corner
-    columns = {f"{name}{BY}{key}": rates[:, row, column] for column, key in enumerate(keys)
-               for row, name in enumerate(DIFFERENTIATED)}
-    return chunk._replace(columns={**chunk.columns, V_C_END: level, **columns, CORNER: corner}, stops=stops)
+    columns = zip(derivatives_by(keys), [level, *rates.transpose(2, 1, 0).reshape(-1, n), corner], strict=True)
+    return chunk._replace(columns={**chunk.columns, **dict(columns)}, stops=stops)

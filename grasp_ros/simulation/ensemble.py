@@ -29,7 +29,7 @@ from grasp_ros.scene.files import opened
 from grasp_ros.scene.places import parameter_of
 from grasp_ros.sensitivity.directions import check_keys
 from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, check, checked, compute, has_inputs
-from grasp_ros.simulation.outcomes import BY, CORNER, OUTCOMES, V_C_END
+from grasp_ros.simulation.outcomes import BY, CORNER, OUTCOMES, V_C_END, derivatives_by
 from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.tables import frame_of, write_rows
 from grasp_ros.simulation.variants import Variants
@@ -152,7 +152,8 @@ def ensemble(
     keys = None if sensitivity is None else names("sensitivity", sensitivity)
     if keys is not None:
         check_keys(scene, keys, setup.sampled)
-    found: dict[str, Array] = {column.name: np.full(variants.rows, np.nan) for column in columns}
+    wanted = [*(column.name for column in columns), *(derivatives_by(keys) if keys else ())]
+    found: dict[str, Array] = {name: np.full(variants.rows, np.nan) for name in wanted}
     status, stops = np.zeros(variants.rows, dtype=np.int8), dict[int, str]()
     spans = chunks(variants.rows, 1 if keys else chunk_rows(scene, setup))  # derivatives take longer than a run
 
@@ -169,8 +170,6 @@ def ensemble(
     with showing(progress, variants.rows, "run", scene.name) as told:
         for (first, last), chunk in in_threads(work, spans, threads):
             for name, values in chunk.columns.items():
-                if name not in found:  # a derivative
-                    found[name] = np.full(variants.rows, np.nan)
                 found[name][first:last] = values
             status[first:last] = chunk.status
             stops.update({first + i: stop for i, stop in chunk.stops.items()})

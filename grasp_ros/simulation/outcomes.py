@@ -120,6 +120,12 @@ OUTCOMES: dict[str, Outcome] = {entry.name: entry for own in _GROUPS.values() fo
 LYAPUNOV = "lyapunov"
 LAST = frozenset(GROUPS["last_state"])  # also of a run that stopped
 V_C_END, CORNER, BY = "V_c_end", "corner", " by "  # columns of derivatives, see `ensemble`: "x_left_end by KEY"
+DIFFERENTIATED = (*GROUPS["last_state"], V_C_END)
+
+
+def derivatives_by(keys: Iterable[str]) -> list[str]:
+    """Columns of an ensemble with derivatives by some numbers of its scene."""
+    return [V_C_END, *(f"{name}{BY}{key}" for key in keys for name in DIFFERENTIATED), CORNER]
 
 
 def find(names: Iterable[str]) -> list[Outcome]:

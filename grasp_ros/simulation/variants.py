@@ -42,7 +42,9 @@ class Block:
         gains, offset = self.laws[..., : Column.SET_POINT], self.laws[..., Column.SET_POINT]
         bodies[:, : OBJECT, Of.STIFFNESS] += gains[..., Column.POSITION_GAIN]
         bodies[:, : OBJECT, Of.DAMPING] += gains[..., Column.VELOCITY_GAIN]
-        bodies[:, : OBJECT, Of.FORCE] += gains[..., Column.POSITION_GAIN] * offset + self.laws[..., Column.FEED_FORWARD]
+        with np.errstate(all="ignore"):  # a row that is refused may hold any number
+            held = gains[..., Column.POSITION_GAIN] * offset
+        bodies[:, : OBJECT, Of.FORCE] += held + self.laws[..., Column.FEED_FORWARD]
         return bodies
 
 

@@ -68,8 +68,10 @@ def test_an_input_that_differs_is_found_and_a_bag_may_end_early_but_lack_no_tick
     state = recording.state.copy()
     state[300, 2] = np.nextafter(state[300, 2], np.inf)
     assert verify(replace(recording, state=state)).same is False
+    fewer = replace(recording, counts={**recording.counts, "timing": recording.counts["timing"] - 2})
+    assert "; the bag lacks 2 messages that its recorder has written" in verify(fewer).words
     cut = {name: getattr(recording, name)[:500] for name in ("tick", "state", "effort", "command", "lyapunov")}
-    begin = replace(recording, **cut)
+    begin = replace(recording, lost={"end": "closed"}, **cut)
     assert np.isnan(begin.inputs[-1]).all()
     assert begin.inputs[:-1].tobytes() == recording.inputs[:499].tobytes()
     assert verify(begin).words == "500 states follow from the recorded inputs, bit for bit"

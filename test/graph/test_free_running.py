@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -104,6 +105,9 @@ def test_a_slow_controller_answers_the_newest_state_and_its_age_is_shown(
     out, err = run.communicate(timeout=DEADLINE)
     recording = bag.read(tmp_path / "run" / "bag")
     usual, most = recording.ages["left"]
+    assert verify(recording).holds
+    silent = replace(recording, held={"left": recording.held["left"][:5]})
+    assert "the bag lacks commands of left that acted, the first at tick" in verify(silent).words
     assert 9.0 <= usual <= most
     assert usual < 1000.0
     assert recording.counts["left/effort_command"] < 1500

@@ -202,7 +202,7 @@ def test_who_prepares_is_waited_for_and_who_does_not_come_is_not(context: rclpy.
     assert not controller.finished
     end_nodes(other)
     wait_for(lambda: executor.spin_once(timeout_sec=0.1) or controller.finished, "its end")
-    assert "nobody has come for 1.6 s" in controller.words
+    assert "in vain for 1.6 s" in controller.words
     executor.shutdown()
     end_nodes(controller)
 

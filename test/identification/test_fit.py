@@ -281,6 +281,12 @@ def test_the_law_of_another_controller_has_no_numbers() -> None:
         fit(run, [P_LEFT, "right_feedback.velocity_gain_Ns_per_m"])
 
 
+def test_recorded_inputs_keep_their_times(held: Trajectory) -> None:
+    """Those of every 2 ms were held for 1 ms each, and the stiffness was wrong by a factor of three."""
+    with pytest.raises(Refused, match=r"its inputs change every 0\.002 s; allowed: a scene with that time\.control"):
+        fit(held, [P_LEFT], SCENE.changed({"time.control_period_s": 0.001}))
+
+
 def test_scipy_is_needed_and_named(held: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "scipy.optimize", None)
     with pytest.raises(Refused, match=r"needs scipy.*; pip install '\.\[fit\]'"):

@@ -280,6 +280,7 @@ def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureF
         (["--x", f"{GAIN}=9:1:4"], "9.0 to 1.0 is not allowed"),
         (["--x", f"{GAIN}=-1:1:4:log"], "> 0 where logarithmic"),
         (["--x", "object.mass_kg=-1:1"], "object.mass_kg: -1.0 is not allowed; allowed: a number >= 1e-12"),
+        (["--vary", "time.duration_s=1:2", "--sample", "4"], "time.duration_s: a time in whole control periods"),
         (["--x", "object.weight=1:2"], "object.weight: not in this scene"),
         (["--x", f"{GAIN}=1:2", "--outcome", "joy"], "outcome joy: not known; allowed: settling_time"),
         (["--vary", f"{GAIN}=1:2"], "--vary: allowed: with --sample N"),
@@ -319,6 +320,8 @@ def test_ends_of_an_axis_are_exact() -> None:
     assert axis.values[[0, -1]].tolist() == [0.1, 0.3]
     np.testing.assert_allclose(axis.values, np.geomspace(0.1, 0.3, 7))
     assert read_axis("--vary", "a.b=0.1:0.3::log") == axis._replace(points=POINTS)
+    assert read_axis("--x", "a.b=1:20:20").values.tolist() == [*range(1, 21)]
+    assert read_axis("--x", "a.b=-1:2:301").values.tolist() == [k / 100 for k in range(-100, 201)]
 
 
 def test_the_label_of_an_axis_ends_with_its_unit() -> None:

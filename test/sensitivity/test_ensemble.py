@@ -29,6 +29,13 @@ def test_rows_are_sensitivities_to_the_last_bit(name: str, sampled: bool) -> Non
             rates = [found.columns[f"{name} by {key}"][i] for name in (*GROUPS["last_state"], "V_c_end")]
             np.testing.assert_array_equal(rates, [*row.state_rates[-1, :, column], row.V_c_rates[-1, column]])
     assert found.dataframe().attrs["units"]["v_object_end by object.position_m"] == "m/s per m"
+    none = ensemble(scene, {P: []}, ["last_state"], setup=Setup(sampled=sampled), sensitivity=keys)
+    assert list(none.columns) == list(found.columns)
+
+
+def test_a_body_that_is_not_there_has_no_derivatives() -> None:
+    rates = simulate(scenes.load("arm_alone"), grid=[1.0], sensitivity=[GAIN]).sensitivity.state_rates
+    assert np.isnan(rates[0, :, 0]).tolist() == [False, False, True, True, True, True]
 
 
 def test_a_row_that_is_refused_takes_nobody_with_it() -> None:

@@ -180,10 +180,15 @@ def test_rates_of_the_energy() -> None:
     ("case_01", "left_arm.colour", "not in this scene"), ("case_01", "time.duration_s", "no derivative"),
     ("noise", P, "measured in steps"), ("sine", "object_sine.frequency_Hz", "phase_rad"),
     ("table", "left_arm_table.force_N", "a list"), ("delay", "loop.delay_ticks", "whole"),
+    ("friction", "object_friction.coulomb_N", "no derivative at 0"),
+    ("delay", "left_sensor.position_noise_m", "no derivative at 0"),
 ])
 def test_what_has_no_derivative_is_refused(name: str, key: str, word: str) -> None:
+    """Friction and noise of 0 are left out of the system: derivatives by them were 0."""
+    off = [f"{key}=0"] if word.endswith("at 0") else []
+    scene = scenes.load(name, [*off, "left_sensor.noise_seed=3"] if "noise" in key else off)
     with pytest.raises(Refused, match=word):
-        derivatives(scenes.load(name), key)
+        derivatives(scene, key)
 
 
 def test_an_object_that_could_as_well_stay_is_flagged(command: Any, tmp_path: Path) -> None:
@@ -234,6 +239,8 @@ def test_spectrum_of_a_damped_arm_and_of_an_elastic_grasp() -> None:
     stiff = arm.changed({"left_arm.damping_Ns_per_m": 300.0})  # which nothing is left of after half a second
     rates = np.linalg.eigvals([[0.0, 1.0], -stiff.system.closed_loop[LEFT, [Of.STIFFNESS, Of.DAMPING]]])
     assert spectrum(stiff) == pytest.approx(np.sort(rates)[::-1], abs=bound)
+    with pytest.raises(Refused, match=r"tangents fall below .* within 0\.000305 s; allowed: slower ones"):
+        spectrum(arm.changed({"left_arm.damping_Ns_per_m": 1e12}))
     slides = horizon("friction", 1.0).changed({
         "left_arm.damping_Ns_per_m": 300.0, "object_friction.coulomb_N": 1e-9, "object.velocity_m_per_s": 1.0})
     assert spectrum(slides) == pytest.approx(spectrum(slides.changed({"object_friction.coulomb_N": 0.0})), abs=1e-6)

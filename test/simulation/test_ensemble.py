@@ -120,6 +120,9 @@ def test_what_cannot_be_varied_is_refused() -> None:
     ):
         with pytest.raises(Refused, match=words):
             ensemble(scene, changes)
+    infinite = ensemble(scenes.load("case_01", ["left_feedback.set_point_m=0"]), {
+        "left_feedback.position_gain_N_per_m": [np.inf]})  # without a warning of numpy
+    assert list(infinite.stops) == [0]
 
 
 def test_each_mass_settles_at_its_own_time() -> None:

@@ -11,6 +11,7 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -34,9 +35,11 @@ from grasp_ros.scene.files import read_text
 from grasp_ros.scene.topics import (
     CHANGES,
     CLOCK,
+    COMMANDS,
     FORCE,
     JOINT_STATES,
     LYAPUNOV,
+    LYAPUNOV_NAMES,
     RUN,
     SCENE,
     TIMING,
@@ -63,12 +66,14 @@ def read(path: str | os.PathLike[str]) -> Recording:
     with decoding_bag(opened.path):
         scene, changes, timing = opened.scene, Changes(), list[Sequence[float]]()
         quality = () if opened.running.lockstep else timing_names(NAMES[body] for body in scene.system.laws)
-        columns = columns_of(opened)
+        columns, held = columns_of(opened), {topic: array("d") for topic in opened.held}
         takers: dict[Topic, Callable[[Stored], object]] = {
             **{topic: column.add for topic, column in columns.items()},
             **{topic: partial(changes.add, topic, scene) for topic in CHANGES.values()},
             TIMING: lambda stored: timing.extend(_of_a_plant(quality, stored)),
             **{topic: partial(_check_text, opened, topic) for topic in (SCENE, RUN)},
+            **{topic: partial(_take_command, forces, Columns(opened.names[topic], topic, scene))
+               for topic, forces in held.items()},
         }
         counts = dict.fromkeys(opened.names, 0)
         for topic, stored in opened.messages:
@@ -79,7 +84,17 @@ def read(path: str | os.PathLike[str]) -> Recording:
             raise EmptyBagError(f"{opened.path}: holds no tick")
         _check_metadata(opened.path, opened.storage)
         table = dict(zip(quality, np.array(timing).T, strict=True)) if timing else {}
-        return _recording(opened, columns, changes, {topic.name: count for topic, count in counts.items()}, table)
+        found = _recording(opened, columns, changes, {topic.name: count for topic, count in counts.items()}, table)
+        commands = {side: np.array(held[topic]) for side, topic in COMMANDS.items() if topic in held}
+        return replace(found, held=commands)
+
+
+def _take_command(forces: array[float], column: Columns, stored: Stored) -> None:
+    """Take a command of a free run, which belongs to no tick."""
+    force = column.numbers(stored.cdr)[-1]
+    if not math.isfinite(force):
+        raise BagError(f"{stored.topic}: {NOT_FINITE}")
+    forces.append(force)
 
 
 def _check_text(opened: Opened, topic: Topic, stored: Stored) -> None:
@@ -193,7 +208,11 @@ class Columns:
         message, names = decode(self._topic, cdr), self.names
         if self._topic == CLOCK:
             return [message.clock.sec, message.clock.nanosec]
-        numbers = [message.wrench.force.x] if self._topic.type == FORCE else message.position
+        numbers = _along_x(message.wrench) if self._topic.type == FORCE else message.position
+        if self._topic == LYAPUNOV and {*message.name} == {*LYAPUNOV_NAMES} and len(message.name) == len(numbers):
+            numbers = [numbers[message.name.index(name)] for name in LYAPUNOV_NAMES]
+        elif self._topic == LYAPUNOV:
+            raise BagError(f"{self._name}: {', '.join(message.name)}; allowed: {', '.join(LYAPUNOV_NAMES)}")
         if self._topic == JOINT_STATES:
             lists = message.position, message.velocity, message.effort
             if any(len(values) != len(message.name) for values in lists) or not {*names} <= {*message.name}:
@@ -212,22 +231,31 @@ class Columns:
         if wrong.any():
             raise BagError(f"{self._name}: tick {ticks[np.argmax(wrong)]}: {why}")
 
-    def of(self) -> tuple[np.ndarray, Array, Array]:
+    def of(self) -> tuple[np.ndarray, Array, np.ndarray]:
         """Ticks (n,), rows (n, k) of numbers, and their stamps (n,) in ns."""
         rows, times = np.array(self._rows).reshape(-1, 2 + self._template.count), np.array(self.times)
-        ticks, stamps = (times // np.uint64(self._period_ns)).astype(np.int64), rows[:, :2] @ (NANOSECONDS, 1)
+        ticks = (times // np.uint64(self._period_ns)).astype(np.int64)
+        stamps = rows[:, :2].astype(np.int64) @ (NANOSECONDS, 1)  # numbers beyond 2^53 ns would be rounded
         wrong = (times % np.uint64(self._period_ns) != 0) | (times > MOST_NS) | (np.diff(ticks, prepend=-1) <= 0)
         if wrong.any():
             time_ns = times[int(np.argmax(wrong))]
             raise BagError(f"{self._name}: {time_ns} ns; allowed: ticks of the scene in their order")
         if self._topic == JOINT_STATES:
-            step, passed = np.diff(stamps, prepend=0.0), np.diff(ticks, prepend=0) * self._period_ns
-            known = (stamps >= 0.0) & (stamps <= self._end_ns) & (stamps % self._period_ns == 0.0)
+            step, passed = np.diff(stamps, prepend=0), np.diff(ticks, prepend=0) * self._period_ns
+            known = (stamps >= 0) & (stamps <= self._end_ns) & (stamps % self._period_ns == 0)
             self.refuse(ticks, ~(known & follows(step, passed, self._period_ns)), NOT_NEXT)
             self.refuse(ticks, self.efforts_of_object(rows).any(axis=1), PUSHED)
         if self._topic != LYAPUNOV:
             self.refuse(ticks, ~np.isfinite(rows).all(axis=1), NOT_FINITE)
         return ticks, rows[:, 2:], stamps
+
+
+def _along_x(wrench: Any) -> list[float]:
+    """The force of a wrench, which has no other."""
+    force, torque = wrench.force, wrench.torque
+    if any((force.y, force.z, torque.x, torque.y, torque.z)):
+        raise BagError("a force or torque beside force.x; allowed: 0")
+    return [force.x]
 
 
 class Changes(dict[int, dict[str, float]]):

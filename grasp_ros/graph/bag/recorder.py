@@ -33,6 +33,7 @@ from grasp_ros.scene.topics import CLOCK, RUN, SCENE, Topic
 FLUSH_SECONDS = 0.1  # a kill loses what came after the last flush; flush and disk have as long again
 INDEX_BYTES = 256  # at most what the index holds of one chunk
 OWN_RECORD, LOST_RECORD = "grasp_ros", "grasp_ros/lost"
+WRITTEN = "messages written"  # counted there, too
 NOT_RECORDED = "messages not recorded"  # counted in LOST_RECORD: what came beside the states, and was too much
 VERSION = "version "  # how the keys of versions begin
 DIGEST, BESIDE = "digest", "digest of metadata.yaml"  # keys of checksums in these records
@@ -234,7 +235,8 @@ class Recorder:
         counts = {topic: self._messages.counts[channel] for topic, channel in self._channels.items()}
         document = rosbag2.metadata(f"{self._path.name}.mcap", counts, self._names, self._last_ns, self._custom)
         text = dump(document)
-        lost = {"end": why, "ticks that are missing": self.gaps or "none", **counters, BESIDE: checksum(text)}
+        lost = {"end": why, "ticks that are missing": self.gaps or "none", WRITTEN: str(sum(counts.values())),
+                **counters, BESIDE: checksum(text)}
         self._writer.add_metadata(LOST_RECORD, signed(lost))
         self._writer.add_metadata(rosbag2.METADATA_RECORD, {
             rosbag2.METADATA_KEY: dump(document[rosbag2.INFORMATION]).strip()

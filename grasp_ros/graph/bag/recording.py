@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.graph.bag.recorder import NOT_RECORDED
+from grasp_ros.graph.bag.recorder import NOT_RECORDED, WRITTEN
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
 from grasp_ros.physics.errors import Refused
@@ -61,6 +61,8 @@ class Recording(Tabular, Frozen):
         the beginning. `tick` and `t` go on where a reset puts simulated time back.
     timing : dict of str to array (m,)
         What a free run has published of its quality, about once a second, see `free_running.Timing`; empty in lockstep.
+    held : dict of str to array (m,), N
+        Commands of a free run by side, as they came; empty in lockstep.
     unheard : dict of str to int
         How many announcements of changed numbers the bag lacks, by topic, as far as their numbers show it.
     lost : dict of str to str
@@ -84,6 +86,7 @@ class Recording(Tabular, Frozen):
     lost: dict[str, str] = field(default_factory=dict)
     timing: dict[str, Array] = field(default_factory=dict)
     unheard: dict[str, int] = field(default_factory=dict)
+    held: dict[str, Array] = field(default_factory=dict)
 
     @cached_property
     def t(self) -> Array:
@@ -258,13 +261,16 @@ class Recording(Tabular, Frozen):
     def missing(self) -> dict[str, int]:
         """Ticks up to the last one recorded that have no message, by topic; without the commands of a free run.
 
-        And what is `unheard`, and what the monitor says that it did not record.
+        And what is `unheard`, and what the monitor says that it did not record, or did and is not there.
         """
         ticks = int(self.tick.max(initial=-1)) + 1
         held = () if self.running.lockstep else self.scene.controllers.values()
         every_tick = [topic.name for topic in (CLOCK, *self.scene.topics) if topic not in held]
-        left_out = {NOT_RECORDED: number} if (number := int(self.lost.get(NOT_RECORDED, 0))) else {}
-        return {**{name: ticks - self.counts[name] for name in every_tick}, **self.unheard, **left_out}
+        there = sum(self.counts.values())
+        others = {NOT_RECORDED: int(self.lost.get(NOT_RECORDED, 0)),
+                  WRITTEN: int(self.lost.get(WRITTEN, there)) - there}
+        return {**{name: ticks - self.counts[name] for name in every_tick}, **self.unheard,
+                **{name: number for name, number in others.items() if number}}
 
 
 def check_recording(recording: object) -> Recording:

@@ -99,9 +99,12 @@ class Storage:
 
     def _check_end(self, offset: int, end: int) -> None:
         """Refuse a record of the data's end that is not where the index begins, and a footer that is not the last."""
-        if self._salvage:
-            return
         footer = self._data.find(FOOTER_HEAD, end)
+        if self._salvage:
+            behind = footer + FOOTER_BYTES
+            if footer >= 0 and behind < len(self._data):
+                self.left_out.append((behind, len(self._data) - behind, "behind the end of the bag"))
+            return
         if not self.closed and 0 <= footer <= len(self._data) - FOOTER_BYTES:
             self._refuse("its last bytes are not the end of an MCAP file")
         if end != offset + DATA_END_BYTES:

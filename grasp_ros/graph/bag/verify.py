@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.graph.bag.recorder import WRITTEN
 from grasp_ros.graph.bag.recording import Recording, check_recording
 from grasp_ros.physics.energy import energy, energy_balance
 from grasp_ros.physics.layout import LEFT, RIGHT
@@ -160,6 +161,11 @@ def _gap(recording: Recording, lost: Mapping[str, np.ndarray]) -> str:
              for name, rows in lost.items() if rows.any()]
     if (without := recording.missing[CLOCK.name]) > 0:
         words.append(f"{CLOCK.name} of {without} ticks")
+    if cut := recording.missing.get(WRITTEN):
+        words.append(f"{cut} messages that its recorder has written")
+    for side, forces in recording.held.items():
+        if (unknown := ~np.isin(recording.effort[:, SIDES[side]], [0.0, *forces])).any():
+            words.append(f"commands of {side} that acted, the first at tick {recording.tick[np.argmax(unknown)]}")
     return f"the bag lacks {' and '.join(words)}" if words else ""
 
 

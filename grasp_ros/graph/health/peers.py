@@ -133,7 +133,7 @@ class PeerNode(GraspNode):
         waited = now - max(self._first_look, self.heartbeats.prepared)
         self.concern = f"for {waited:.0f} s" if waited > self.patience else ""
         if waited > self.start_patience and self._ends:
-            self.fail(f"{self.words}: nobody has come for {self.start_patience:g} s")
+            self.fail(f"{self.words}: in vain for {self.start_patience:g} s")
 
     def _trouble_with(self, need: Need, now: float) -> Trouble | None:
         """What is wrong with a topic; None if all is well."""
@@ -143,9 +143,9 @@ class PeerNode(GraspNode):
                 return None
             if now - self._gone.setdefault(need.topic, now) < GONE_SECONDS:
                 return None
-            last = self._last[need.topic]
-            said = [beat.ended for beat in self.heartbeats.of(last) if beat.ended]
-            words = f"{need.topic.name}: {' and '.join(last)} has ended"
+            last, beats = self._last[need.topic], self.heartbeats.of(self._last[need.topic])
+            said = [beat.ended for beat in beats if beat.ended]
+            words = f"{need.topic.name}: {' and '.join(last)} {'has ended' if beats else 'publishes it no more'}"
             return Trouble(words + "".join(f": {why}" for why in said[-1:] if why != ENDED), True)
         self._gone.pop(need.topic, None)
         self._last[need.topic] = names

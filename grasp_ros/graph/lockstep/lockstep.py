@@ -70,7 +70,8 @@ class Lockstep:
     def needs(self) -> Iterator[Need]:
         """Controllers that answer the current state, and a monitor that records it."""
         plant = self._plant
-        what = f"answer to tick {plant.tick}"
+        refused = plant.counters["refused commands"] or plant.counters["commands beyond a limit"]
+        what = f"answer{' that is allowed' if refused else ''} to tick {plant.tick}"
         for topic, side in zip(self.topics, plant.scene.system.laws, strict=True):
             due = math.inf if side in self._commands or topic in self._unsettled else plant.asked
             yield Need(topic, Gone.AS_TOLD, what=what, due=due, first=not self.answered)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from datetime import datetime
@@ -53,6 +53,7 @@ from grasp_ros.scene.versions import versions
 
 MOST_TICKS, MOST_SECONDS = 128, 0.05  # that are evaluated at once, and of wall time that a tick waits for others
 BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what came before a signal, and without any more of it
+EARLY = 1000  # messages beside the states that are kept until the first one comes
 MOST_BYTES, MOST_BESIDE_BYTES = 2**16, 2**24  # beside the states: of a message; of a topic from report to report
 DIAGNOSTICS_LEFT_OUT = "diagnostics not recorded"  # which anybody on the host may send
 
@@ -81,6 +82,7 @@ class Monitor(PeerNode):
         self._others: list[Subscription] = []  # of what does not come with every state
         self._published, self._advanced = b"", 0.0  # for the last tick, and the wall time at which it came
         self._numbers = {side: Numbers() for side in CHANGES}  # of the announcements
+        self._early: deque[tuple[Topic, bytes]] = deque(maxlen=EARLY)  # what comes beside before the first state
         self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
         self._plant, self._at_end = "", False  # identity of the one that is recorded; whether its last tick is
         self._sources: dict[Topic, Sources] = {}  # of commands that come with every state
@@ -173,14 +175,16 @@ class Monitor(PeerNode):
     def _record(self, topic: Topic, cdr: bytes) -> None:
         """Keep what does not come with every state, at the time of the last one, as long as it is not too much."""
         self._beside[topic] += len(cdr)
-        if self._recorder is None or not (self._due or self.counters["ticks"]):
+        if self._recorder is None:
             return
         if len(cdr) > MOST_BYTES or self._beside[topic] > MOST_BESIDE_BYTES:
             self.refuse(DIAGNOSTICS_LEFT_OUT if topic == DIAGNOSTICS else NOT_RECORDED, topic)
         elif self._due:
             self._due[-1][2].append((topic, cdr))
-        else:
+        elif self.counters["ticks"]:
             self._recorder.write(topic, cdr)
+        elif topic != DIAGNOSTICS:
+            self._early.append((topic, cdr))
 
     def _on_announcement(self, side: str, cdr: bytes) -> None:
         try:
@@ -220,6 +224,8 @@ class Monitor(PeerNode):
     def _take(self, tick: Tick) -> None:
         """Put a tick in its place in the bag's time; evaluate what waits once there is enough, or something changes."""
         assert self._scene is not None
+        if tick.lost and tick.time_ns and not (self._due or self.counters["ticks"]):
+            return  # it has come late, while its subscriptions were being connected
         if tick.restarted or self._lyapunov.changes(tick.time_ns):
             self._complete()
         if tick.restarted:
@@ -230,7 +236,8 @@ class Monitor(PeerNode):
         self.count("restored commands", tick.restored)
         self.count("lost messages", tick.lost)
         self.count("messages without a state", tick.dropped)
-        beside = [(CHANGES[side], cdr) for side, cdr in self._lyapunov.begin(tick.time_ns)]
+        beside = [*self._early, *((CHANGES[side], cdr) for side, cdr in self._lyapunov.begin(tick.time_ns))]
+        self._early.clear()
         self._due.append((self._bag_ns, tick, beside))
         if len(self._due) >= MOST_TICKS or tick.time_ns == self._synchronizer.end_ns:
             self._complete()

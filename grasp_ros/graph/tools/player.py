@@ -12,7 +12,7 @@ from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.topics import WINDOW
+from grasp_ros.scene.topics import JOINT_STATES, WINDOW
 
 # For readers to be found, and at most for the first to come and all to be connected: who missed the announcements at
 # the start hears of this node again after 3 s.
@@ -26,14 +26,14 @@ class Player(GraspNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("player", **options)
         bag = Opened(self.read_only("bag"))
+        if not any(topic == JOINT_STATES for topic, _ in Opened(bag.path).messages):
+            raise EmptyBagError(f"{bag.path}: holds no tick")
         self._rate = self.read_only("rate")
         if not 0.0 < self._rate < math.inf:
             raise Refused(f"rate: {self._rate!r} is not allowed; allowed: a number > 0")
         self._rows = bag.messages
-        first = next(self._rows, None)
-        if first is None:
-            raise EmptyBagError(f"{bag.path}: holds no tick")
-        self._next, self._first_ns = first, first[1].time_ns
+        self._next = next(self._rows)
+        self._first_ns = self._next[1].time_ns
         self._outputs = {topic: self.create_publisher(messages.TYPES[topic.type], name, messages.qos(topic))
                          for topic, name in bag.names.items()}
         self.counters["messages"] = 0
