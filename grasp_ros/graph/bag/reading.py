@@ -208,7 +208,7 @@ class Columns:
         message, names = decode(self._topic, cdr), self.names
         if self._topic == CLOCK:
             return [message.clock.sec, message.clock.nanosec]
-        numbers = _along_x(message.wrench) if self._topic.type == FORCE else message.position
+        numbers = self._along_x(message.wrench) if self._topic.type == FORCE else message.position
         if self._topic == LYAPUNOV and {*message.name} == {*LYAPUNOV_NAMES} and len(message.name) == len(numbers):
             numbers = [numbers[message.name.index(name)] for name in LYAPUNOV_NAMES]
         elif self._topic == LYAPUNOV:
@@ -221,6 +221,13 @@ class Columns:
         if len(numbers) != self._template.count:
             raise BagError(f"{self._name}: {len(numbers)} numbers; allowed: {self._template.count}")
         return [message.header.stamp.sec, message.header.stamp.nanosec, *numbers]
+
+    def _along_x(self, wrench: Any) -> list[float]:
+        """The force of a wrench, which has no other."""
+        force, torque = wrench.force, wrench.torque
+        if any((force.y, force.z, torque.x, torque.y, torque.z)):
+            raise BagError(f"{self._name}: a force or torque beside force.x; allowed: 0")
+        return [force.x]
 
     def efforts_of_object(self, rows: Array) -> Array:
         """Efforts (n, 1) of the object in rows (n, 2 + k) of states; (n, 0) without one."""
@@ -248,14 +255,6 @@ class Columns:
         if self._topic != LYAPUNOV:
             self.refuse(ticks, ~np.isfinite(rows).all(axis=1), NOT_FINITE)
         return ticks, rows[:, 2:], stamps
-
-
-def _along_x(wrench: Any) -> list[float]:
-    """The force of a wrench, which has no other."""
-    force, torque = wrench.force, wrench.torque
-    if any((force.y, force.z, torque.x, torque.y, torque.z)):
-        raise BagError("a force or torque beside force.x; allowed: 0")
-    return [force.x]
 
 
 class Changes(dict[int, dict[str, float]]):
