@@ -53,7 +53,6 @@ from grasp_ros.scene.versions import versions
 
 MOST_TICKS, MOST_SECONDS = 128, 0.05  # that are evaluated at once, and of wall time that a tick waits for others
 BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what came before a signal, and without any more of it
-EARLY = 1000  # messages beside the states that are kept until the first one comes
 MOST_BYTES, MOST_BESIDE_BYTES = 2**16, 2**24  # beside the states: of a message; of a topic from report to report
 DIAGNOSTICS_LEFT_OUT = "diagnostics not recorded"  # which anybody on the host may send
 
@@ -82,7 +81,7 @@ class Monitor(PeerNode):
         self._others: list[Subscription] = []  # of what does not come with every state
         self._published, self._advanced = b"", 0.0  # for the last tick, and the wall time at which it came
         self._numbers = {side: Numbers() for side in CHANGES}  # of the announcements
-        self._early: deque[tuple[Topic, bytes]] = deque(maxlen=EARLY)  # what comes beside before the first state
+        self._early: deque[tuple[Topic, bytes]] = deque(maxlen=1000)  # what comes beside before the first state
         self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
         self._plant, self._at_end = "", False  # identity of the one that is recorded; whether its last tick is
         self._sources: dict[Topic, Sources] = {}  # of commands that come with every state
@@ -224,8 +223,6 @@ class Monitor(PeerNode):
     def _take(self, tick: Tick) -> None:
         """Put a tick in its place in the bag's time; evaluate what waits once there is enough, or something changes."""
         assert self._scene is not None
-        if tick.lost and tick.time_ns and not (self._due or self.counters["ticks"]):
-            return  # it has come late, while its subscriptions were being connected
         if tick.restarted or self._lyapunov.changes(tick.time_ns):
             self._complete()
         if tick.restarted:
@@ -277,11 +274,8 @@ class Monitor(PeerNode):
         if values["alarm"]:
             self.count("alarms")
             # `grasp run` and a plant that waits for this monitor end; the bag keeps this tick
-            self.fail(
-                f"V_c rose by {values['unexplained']!r} J more than the work of the held forces,"
-                f" t = {tick.time_ns / NANOSECONDS} s, mode {int(values['mode'])},"
-                f" state {tick.state.numbers}"
-            )
+            self.fail(f"V_c rose by {values['unexplained']!r} J more than the work of the held forces, t ="
+                      f" {tick.time_ns / NANOSECONDS} s, mode {int(values['mode'])}, state {tick.state.numbers}")
 
     def _take_what_came(self) -> None:
         """Record what is on the way when a signal comes, which all nodes may get at once: the plant may be ahead."""
