@@ -156,8 +156,6 @@ def check(plan: Plan) -> None:
         parameter = parameter_of(plan.scene, key)
         if parameter.whole:
             raise Refused(f"{plan.scene.name}: {key}: a whole number; allowed: numbers with a range")
-        if plan.sample and key.startswith("time."):  # nearly none that is drawn holds whole periods
-            raise Refused(f"{plan.scene.name}: {key}: a time in whole control periods; allowed: numbers of any size")
         for end in (axis.low, axis.high):
             if not parameter.accepts(end):
                 raise Refused(f"{plan.scene.name}: {key}: {end!r} is not allowed; allowed: {parameter.allowed}")

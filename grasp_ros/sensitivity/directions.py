@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -103,7 +104,10 @@ def check_keys(scene: Scene, keys: Sequence[str], sampled: bool) -> list[Paramet
         if (sampled or scene.sampled) and law.row[[*STEPS]].any():
             raise Refused(f"{scene.name}: the {('left', 'right')[side]} arm is measured in steps, which have no"
                           " derivative; allowed: a sensor without position_step_m and velocity_step_m_per_s")
-    return [check_key(scene, key) for key in keys]
+    found = [check_key(scene, key) for key in keys]
+    for key in filter(partial(_is_off, scene), keys):
+        raise Refused(f"{scene.name}: {key} has no derivative at 0: its effect is left out; allowed: a small number")
+    return found
 
 
 def check_key(scene: Scene, key: str) -> Parameter:
@@ -115,8 +119,6 @@ def check_key(scene: Scene, key: str) -> Parameter:
         If the scene does not name it, or it does not enter smoothly.
     """
     parameter = parameter_of(scene, key)
-    if _is_off(scene, key):
-        raise Refused(f"{scene.name}: {key} has no derivative at 0: its effect is left out; allowed: a small number")
     if parameter.unit in NOT_SMOOTH or parameter.whole:
         raise Refused(f"{scene.name}: {key} has no derivative: {NOT_SMOOTH.get(parameter.unit, 'it is whole')}")
     return parameter

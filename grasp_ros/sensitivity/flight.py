@@ -25,18 +25,16 @@ from grasp_ros.sensitivity.tangents import STATES, TangentMotion, TangentRates, 
 SERIES = 16  # terms of an exponential whose argument is below LARGEST_ARGUMENT
 LARGEST_ARGUMENT = 0.25
 FEW, SHORT = 10, 2.0**-9  # terms are enough for the derivatives, too, where the argument is below this
-Row3 = tuple[float, float, float]
+Linear = tuple[float, float, float]  # what one unit of x, of v and of a constant acceleration makes
 
 
 class Flow(IntEnum):
-    """Places of the numbers of a body, each HALF behind the last: of its flow, and of the derivatives of these.
+    """Places of the numbers of a body, each HALF behind the last: four of its flow, their derivatives by K and by C.
 
-    They are x by x, x by v, v by v, and x by a constant acceleration. That is v by x / -K, and v by the acceleration,
-    too, with the second one.
+    The four are x by x, x by v, v by v and x by a constant acceleration. v by x is -K times the second, v by the
+    acceleration is the second.
     """
 
-    BY_STIFFNESS = 4
-    BY_DAMPING = 8
     STIFFNESS = 12  # K itself, 1/s^2
     DAMPING = 13  # C, 1/s
     TIMES = 14  # how often the time was halved
@@ -81,8 +79,9 @@ def write_flows(motion: TangentMotion, t: float, flows: Array) -> None:
 
 
 @kernel
-def double_flow(f: Array) -> None:
-    """Double the time of a body's flow as often as it was halved: it is squared."""
+def fly_tangent(motion: TangentMotion, rates: TangentRates, flows: Array, body: Body) -> None:
+    """Write the tangents of a body to `at`: its flow is squared as often as the time was halved."""
+    f, v = flows[body::HALF], velocity_lane(body)
     stiffness = f[Flow.STIFFNESS]
     a, s, d, q, a_k, s_k, d_k, q_k, a_c, s_c, d_c, q_c = (
         f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8], f[9], f[10], f[11])
@@ -94,26 +93,14 @@ def double_flow(f: Array) -> None:
         a_k, d_k = 2.0 * a * a_k - square - later_k, 2.0 * d * d_k - square - later_k
         a_c, d_c = 2.0 * a * a_c - later_c, 2.0 * d * d_c - later_c
         a, d, s = a * a - stiffness * square, d * d - stiffness * square, s * both
-    f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8], f[9], f[10], f[11] = (
-        a, s, d, q, a_k, s_k, d_k, q_k, a_c, s_c, d_c, q_c)
+    write_tangent(motion, rates, body, v - 1, (a, s, q), (a_k, s_k, q_k), (a_c, s_c, q_c))
+    write_tangent(motion, rates, body, v, (-stiffness * s, d, s), (-s - stiffness * s_k, d_k, s_k),
+                  (-stiffness * s_c, d_c, s_c))
 
 
 @kernel
-def fly_tangent(motion: TangentMotion, rates: TangentRates, flows: Array, body: Body) -> None:
-    """Write the tangents of a body in flight to `at`, after the time of the flows."""
-    f, v = flows[body::HALF], velocity_lane(body)
-    double_flow(f)
-    stiffness, first, second, third = f[Flow.STIFFNESS], f[:4], f[Flow.BY_STIFFNESS:], f[Flow.BY_DAMPING:]
-    write_tangent(motion, rates, body, v - 1, (first[0], first[1], first[3]), (second[0], second[1], second[3]),
-                  (third[0], third[1], third[3]))
-    write_tangent(motion, rates, body, v, (-stiffness * first[1], first[2], first[1]),
-                  (-first[1] - stiffness * second[1], second[2], second[1]),
-                  (-stiffness * third[1], third[2], third[1]))
-
-
-@kernel
-def write_tangent(motion: TangentMotion, rates: TangentRates, body: Body, lane: int, flow: Row3, stiffer: Row3,
-                  slower: Row3) -> None:
+def write_tangent(motion: TangentMotion, rates: TangentRates, body: Body, lane: int, flow: Linear,
+                  stiffer: Linear, slower: Linear) -> None:
     """Write the tangents of one lane: its flow, from x, v and a constant acceleration, and derivatives by K and C."""
     row, own, v = motion.bodies[body], rates.acting[body], velocity_lane(body)
     mass, x_0, v_0 = row[Of.MASS], motion.before[v - 1], motion.before[v]

@@ -191,6 +191,8 @@ def add_neglected(motion: TangentMotion, moved: Array, side: Body, span: float) 
 @kernel
 def fly_free(t: Tangents, presses: bool, tau: float) -> None:
     """Write the tangents of the bodies that touch nothing after tau s of a segment to `at`."""
+    if presses and touches(t.motion, LEFT) and touches(t.motion, RIGHT):
+        return
     write_flows(t.motion, tau, t.flows)
     for body in (LEFT, OBJECT, RIGHT):
         if not (presses and touches(t.motion, body)):

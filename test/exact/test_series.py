@@ -285,7 +285,8 @@ def test_time_is_inverted_to_rounding(name: str) -> None:
     c, high = expand(name, n, unit=unit), 0.3 if "both" in name else 0.2
     for s in (1e-9, 0.03, 0.17, high):
         tau, total = at(c, s)[Lane.TIME], at(c, high)[Lane.TIME]
-        found = invert_time(tables_of(c), step_of(name, n, unit), tau, high, total)
+        tables = tables_of(c)
+        found = invert_time(tables.c, tables.at, step_of(name, n, unit), tau, high, total)
         assert at(c, found)[Lane.TIME] == pytest.approx(tau, rel=1e-15, abs=1e-17)
 
 

@@ -280,7 +280,6 @@ def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureF
         (["--x", f"{GAIN}=9:1:4"], "9.0 to 1.0 is not allowed"),
         (["--x", f"{GAIN}=-1:1:4:log"], "> 0 where logarithmic"),
         (["--x", "object.mass_kg=-1:1"], "object.mass_kg: -1.0 is not allowed; allowed: a number >= 1e-12"),
-        (["--vary", "time.duration_s=1:2", "--sample", "4"], "time.duration_s: a time in whole control periods"),
         (["--x", "object.weight=1:2"], "object.weight: not in this scene"),
         (["--x", f"{GAIN}=1:2", "--outcome", "joy"], "outcome joy: not known; allowed: settling_time"),
         (["--vary", f"{GAIN}=1:2"], "--vary: allowed: with --sample N"),

@@ -20,14 +20,14 @@ from grasp_ros.exact.records import Integers, Segment
 
 ADDRESS, CONTEXT = 0, 1  # places of an observer
 FINISH, REST = -1, -3  # in place of a kind of segment: after a run, and where nothing moves in an interval
-SIGNATURE = int64(int64, int64, float64, float64, float64, int64)
+SIGNATURE = int64(int64, int64, float64, float64, float64, int64)  # of an observer, see `notify`
 _FUNCTIONS: dict[int, Any] = {}  # where nothing is compiled
 _RECORDS: dict[int, Any] = {}  # likewise
 
 
 @instruction(lambda _, address, context, kind, t, s, unit, degree: (int64(int64, *SIGNATURE.args), code_of_call))
 def call(address: int, context: int, kind: int | np.int64, t: float, s: float, unit: float, degree: int) -> int:
-    """Call the function of this SIGNATURE at an address."""
+    """Call the observer at an address."""
     return int(_FUNCTIONS[int(address)](int(context), kind, t, s, unit, degree))
 
 

@@ -11,7 +11,6 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -84,9 +83,9 @@ def read(path: str | os.PathLike[str]) -> Recording:
             raise EmptyBagError(f"{opened.path}: holds no tick")
         _check_metadata(opened.path, opened.storage)
         table = dict(zip(quality, np.array(timing).T, strict=True)) if timing else {}
-        found = _recording(opened, columns, changes, {topic.name: count for topic, count in counts.items()}, table)
         commands = {side: np.array(held[topic]) for side, topic in COMMANDS.items() if topic in held}
-        return replace(found, held=commands)
+        named = {topic.name: count for topic, count in counts.items()}
+        return _recording(opened, columns, changes, named, table, commands)
 
 
 def _take_command(forces: array[float], column: Columns, stored: Stored) -> None:
@@ -149,7 +148,7 @@ def _check_metadata(path: Path, storage: Storage) -> None:
 
 def _recording(
     opened: Opened, columns: Mapping[Topic, Columns], changes: Changes, counts: dict[str, int],
-    timing: dict[str, Array],
+    timing: dict[str, Array], held: dict[str, Array],
 ) -> Recording:
     """All of it, as arrays."""
     scene, states = opened.scene, columns[JOINT_STATES]
@@ -176,7 +175,7 @@ def _recording(
         opened.path, scene, opened.versions, counts, ticks, state, effort, command,
         {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
         dict(changes), opened.running, ticks[stamps == 0], _lost(opened.storage), timing,
-        dict(+changes.unheard),
+        dict(+changes.unheard), held,
     )
 
 
@@ -209,10 +208,6 @@ class Columns:
         if self._topic == CLOCK:
             return [message.clock.sec, message.clock.nanosec]
         numbers = self._along_x(message.wrench) if self._topic.type == FORCE else message.position
-        if self._topic == LYAPUNOV and {*message.name} == {*LYAPUNOV_NAMES} and len(message.name) == len(numbers):
-            numbers = [numbers[message.name.index(name)] for name in LYAPUNOV_NAMES]
-        elif self._topic == LYAPUNOV:
-            raise BagError(f"{self._name}: {', '.join(message.name)}; allowed: {', '.join(LYAPUNOV_NAMES)}")
         if self._topic == JOINT_STATES:
             lists = message.position, message.velocity, message.effort
             if any(len(values) != len(message.name) for values in lists) or not {*names} <= {*message.name}:
@@ -220,6 +215,10 @@ class Columns:
             numbers = np.array(lists)[:, [message.name.index(name) for name in names]].ravel()
         if len(numbers) != self._template.count:
             raise BagError(f"{self._name}: {len(numbers)} numbers; allowed: {self._template.count}")
+        if self._topic == LYAPUNOV:
+            if sorted(message.name) != sorted(LYAPUNOV_NAMES):
+                raise BagError(f"{self._name}: {', '.join(message.name)}; allowed: {', '.join(LYAPUNOV_NAMES)}")
+            numbers = [numbers[message.name.index(name)] for name in LYAPUNOV_NAMES]
         return [message.header.stamp.sec, message.header.stamp.nanosec, *numbers]
 
     def _along_x(self, wrench: Any) -> list[float]:

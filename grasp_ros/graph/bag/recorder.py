@@ -33,8 +33,8 @@ from grasp_ros.scene.topics import CLOCK, RUN, SCENE, Topic
 FLUSH_SECONDS = 0.1  # a kill loses what came after the last flush; flush and disk have as long again
 INDEX_BYTES = 256  # at most what the index holds of one chunk
 OWN_RECORD, LOST_RECORD = "grasp_ros", "grasp_ros/lost"
-WRITTEN = "messages written"  # counted there, too
-NOT_RECORDED = "messages not recorded"  # counted in LOST_RECORD: what came beside the states, and was too much
+# Counted in LOST_RECORD: all that is in the bag, and what came beside the states and was too much.
+WRITTEN, NOT_RECORDED = "messages written", "messages not recorded"
 VERSION = "version "  # how the keys of versions begin
 DIGEST, BESIDE = "digest", "digest of metadata.yaml"  # keys of checksums in these records
 

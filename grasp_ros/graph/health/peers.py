@@ -143,7 +143,8 @@ class PeerNode(GraspNode):
                 return None
             if now - self._gone.setdefault(need.topic, now) < GONE_SECONDS:
                 return None
-            last, beats = self._last[need.topic], self.heartbeats.of(self._last[need.topic])
+            last = self._last[need.topic]
+            beats = self.heartbeats.of(last)
             said = [beat.ended for beat in beats if beat.ended]
             words = f"{need.topic.name}: {' and '.join(last)} {'has ended' if beats else 'publishes it no more'}"
             return Trouble(words + "".join(f": {why}" for why in said[-1:] if why != ENDED), True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from itertools import chain
 from typing import Any
 
 from grasp_ros.graph.bag.errors import EmptyBagError
@@ -26,14 +27,18 @@ class Player(GraspNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("player", **options)
         bag = Opened(self.read_only("bag"))
-        if not any(topic == JOINT_STATES for topic, _ in Opened(bag.path).messages):
-            raise EmptyBagError(f"{bag.path}: holds no tick")
         self._rate = self.read_only("rate")
         if not 0.0 < self._rate < math.inf:
             raise Refused(f"rate: {self._rate!r} is not allowed; allowed: a number > 0")
-        self._rows = bag.messages
-        self._next = next(self._rows)
-        self._first_ns = self._next[1].time_ns
+        begin = []  # up to the first state
+        for row in bag.messages:
+            begin.append(row)
+            if row[0] == JOINT_STATES:
+                break
+        else:
+            raise EmptyBagError(f"{bag.path}: holds no tick")
+        self._rows = chain(begin[1:], bag.messages)
+        self._next, self._first_ns = begin[0], begin[0][1].time_ns
         self._outputs = {topic: self.create_publisher(messages.TYPES[topic.type], name, messages.qos(topic))
                          for topic, name in bag.names.items()}
         self.counters["messages"] = 0
