@@ -16,11 +16,13 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
+from grasp_ros.physics.layout import EPS
 from grasp_ros.physics.model import Array
 
 NODES = 24
 RESOLVED = 1e-12  # last coefficients of a piece, relative to the largest value of its group
 LAST = 3  # coefficients that must be small
+ROUNDINGS, TINY = 4.0 * EPS, np.finfo(float).tiny  # of a time; what no two times are nearer than
 HALVINGS = 12  # of a piece; what is not resolved then is no smooth function, or rounding
 States = Callable[[Array], Array]
 Quantity = Callable[[Array, Array], tuple[Array, Array]]  # t (n,), state (n, 6) to values and their rounding (n, m)
@@ -86,14 +88,16 @@ def expand(states: States, quantity: Quantity, begins: Array, ends: Array, group
     for halving in range(HALVINGS + 1):
         if not len(begin):
             break
-        t = (begin[:, None] + length[:, None] * PART).ravel()
-        found, noise = (rows.reshape(len(begin), NODES, -1) for rows in quantity(t, states(t)))
+        t = begin[:, None] + length[:, None] * PART
+        found, noise = (rows.reshape(len(begin), NODES, -1) for rows in quantity(t.ravel(), states(t.ravel())))
         if scale.shape[1] != found.shape[2]:
             scale = np.zeros((len(scale), found.shape[2]))
         np.maximum.at(scale, group, np.abs(found).max(axis=1))
         series = np.einsum("xj,kjm->kxm", TO_SERIES, found)
         tail = np.abs(series[:, -LAST:]).max(axis=1)
-        good = (tail <= RESOLVED * scale[group] + noise.max(axis=1)).all(axis=1)
+        steepest = np.abs(np.diff(found, axis=1) / np.maximum(np.diff(t), TINY)[..., None]).max(axis=1)
+        rounding = noise.max(axis=1) + ROUNDINGS * t[:, -1:] * steepest  # of values, and of times late in a run
+        good = (tail <= RESOLVED * scale[group] + rounding).all(axis=1)
         kept = good if halving < HALVINGS else np.ones(len(begin), dtype=bool)
         done.append(Pieces(begin[kept], length[kept], group[kept], found[kept], series[kept], good[kept]))
         half, left = 0.5 * length[~kept], begin[~kept]

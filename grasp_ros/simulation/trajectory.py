@@ -200,7 +200,8 @@ class Trajectory(Tabular, Frozen):
         and -u' at the release in m/s, and `restitution`, their quotient; `peak_force` in N, `impulse` in N s, `loss`,
         the energy that the contact took, in J, and `deepest`, the largest u in m. A contact that goes on at the end of
         the run ends there, and has NaN for speed_out and restitution; so has one that was there at the begin for
-        speed_in. Peaks and integrals are those of polynomials that follow the motion to 1e-12.
+        speed_in. Peaks and integrals are those of polynomials that follow the states to 1e-12 and to their rounding,
+        which a u that is small beside the positions feels.
 
         Raises
         ------

@@ -11,12 +11,15 @@ from documents import case_of, scene_of
 from grasp_ros import scene
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, Transition
+from grasp_ros.physics.model import Array
 from grasp_ros.simulation import ensemble, simulate
 from grasp_ros.simulation.contacts import UNITS
 from grasp_ros.simulation.losses import losses
+from grasp_ros.simulation.smooth import expand
 
 RUNS: dict[str, tuple[str, list[str], dict[str, Any]]] = {
     "case 1": ("case_01", [], {}), "sampled": ("case_01", [], {"sampled": True}),
+    "late": ("case_02", ["time.duration_s=600"], {}),
     "clamped": ("v_jump_one_sided", [], {}), "held for long": ("preload", [], {}),
     "from begin to end": ("hammer", ["left_arm.position_m=0.02", "time.duration_s=0.01"], {}),
     "from begin to end, clamped": (
@@ -39,6 +42,17 @@ def test_impulses_are_the_change_of_momentum_and_losses_those_of_the_run(kind: s
     if not run.sampled and "method" not in how:  # otherwise `losses` are no more exact than the output times
         assert lost == pytest.approx(float(losses(run).impacts), rel=1e-10)
     assert left.dtype.names == tuple(UNITS)
+
+
+def test_a_piece_late_in_a_run_is_resolved_though_its_times_are_rounded() -> None:
+    def quantity(t: Array, _: Array) -> tuple[Array, Array]:
+        return np.sin(1000.0 * (t - 2000.0))[:, None], np.zeros((len(t), 1))
+
+    begin, end = np.array([2000.0]), np.array([2000.01])
+    pieces = expand(lambda t: np.zeros((len(t), 6)), quantity, begin, end, np.zeros(1, int))
+    assert pieces.resolved.all()
+    assert len(pieces.begin) <= 8
+    assert pieces.integral(0, 1) == pytest.approx((1.0 - np.cos(10.0)) / 1000.0, rel=1e-10)
 
 
 def test_a_contact_from_begin_to_end_is_there_and_its_peak_may_be_at_its_begin() -> None:

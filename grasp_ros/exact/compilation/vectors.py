@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -28,7 +28,7 @@ from grasp_ros.exact.compilation.jit import instruction
 from grasp_ros.exact.records import Array, Lanes
 
 WIDTH, HALF = 8, 4
-INDEX = ir.IntType(32)
+INDEX, QUAD = ir.IntType(32), ir.VectorType(ir.DoubleType(), HALF)
 ALIGNMENT = np.dtype(float).alignment  # of arrays: vectors lie anywhere in them
 
 
@@ -37,7 +37,7 @@ class Vector(types.Type):
 
     def __init__(self, width: int) -> None:
         super().__init__(f"vector of {width}")
-        self.width, self.lanes = width, ir.VectorType(ir.DoubleType(), width)
+        self.width = width
 
 
 KINDS, REAL = {width: Vector(width) for width in (WIDTH, HALF)}, types.float64
@@ -45,60 +45,73 @@ KINDS, REAL = {width: Vector(width) for width in (WIDTH, HALF)}, types.float64
 
 @register_model(Vector)
 class VectorModel(models.PrimitiveModel):
-    """What a vector is for the machine: a register."""
+    """What a vector is for the machine: registers of four numbers.
+
+    One of eight must wait until numbers that were just written by fours have left for memory.
+    """
 
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, kind.lanes)
+        super().__init__(manager, kind, ir.ArrayType(QUAD, kind.width // HALF))
 
 
-def _filled(builder: Any, kind: Any, value: Any, vector: Any) -> Any:
-    """A vector as it is, a number as a vector of it."""
+def _quads(builder: Any, kind: Any, value: Any, count: int) -> list[Any]:
+    """The registers of a vector, or a number in each place of as many."""
     if isinstance(kind, Vector):
-        return value
-    nothing = ir.Constant(vector.lanes, ir.Undefined)
-    each = ir.Constant(ir.VectorType(INDEX, vector.width), [0] * vector.width)
-    return builder.shuffle_vector(builder.insert_element(nothing, value, INDEX(0)), nothing, each)
+        return [builder.extract_value(value, i) for i in range(count)]
+    nothing = ir.Constant(QUAD, ir.Undefined)
+    each = ir.Constant(ir.VectorType(INDEX, HALF), [0] * HALF)
+    return [builder.shuffle_vector(builder.insert_element(nothing, value, INDEX(0)), nothing, each)] * count
+
+
+def _vector(builder: Any, quads: Sequence[Any]) -> Any:
+    found = ir.Constant(ir.ArrayType(QUAD, len(quads)), ir.Undefined)
+    for i, quad in enumerate(quads):
+        found = builder.insert_value(found, quad, i)
+    return found
 
 
 def _emit(instruction: Callable[..., Any]) -> Any:
     """Code of an operation on vectors, and on numbers in their place."""
     def code(_: Any, builder: Any, kinds: Any, values: Any) -> Any:
-        filled = (_filled(builder, kind, value, kinds.return_type)
-                  for kind, value in zip(kinds.args, values, strict=True))
-        return instruction(builder, *filled)
+        count = kinds.return_type.width // HALF
+        filled = (_quads(builder, kind, value, count) for kind, value in zip(kinds.args, values, strict=True))
+        return _vector(builder, [instruction(builder, *quads) for quads in zip(*filled, strict=True)])
 
     return code
 
 
 def _of_llvm(name: str) -> Callable[..., Any]:
-    def instruction(builder: Any, *vectors: Any) -> Any:
-        lanes = vectors[0].type
-        kind = ir.FunctionType(lanes, [lanes] * len(vectors))
-        return builder.call(get_or_insert_function(builder.module, kind, f"llvm.{name}.v{lanes.count}f64"), vectors)
+    def instruction(builder: Any, *quads: Any) -> Any:
+        kind = ir.FunctionType(QUAD, [QUAD] * len(quads))
+        return builder.call(get_or_insert_function(builder.module, kind, f"llvm.{name}.v{HALF}f64"), quads)
 
     return instruction
 
 
-def _place(context: Any, builder: Any, kinds: Any, values: Any, vector: Any) -> Any:
-    data = context.make_array(kinds.args[0])(context, builder, values[0]).data
-    return builder.bitcast(builder.gep(data, [values[1]]), vector.lanes.as_pointer())
+def _places(context: Any, builder: Any, kinds: Any, values: Any, vector: Any) -> list[Any]:
+    """Where in an array the registers of a vector begin."""
+    data = builder.gep(context.make_array(kinds.args[0])(context, builder, values[0]).data, [values[1]])
+    return [builder.bitcast(builder.gep(data, [INDEX(i)]), QUAD.as_pointer()) for i in range(0, vector.width, HALF)]
 
 
 def _code_of_load(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
-    return builder.load(_place(context, builder, kinds, values, kinds.return_type), align=ALIGNMENT)
+    places = _places(context, builder, kinds, values, kinds.return_type)
+    return _vector(builder, [builder.load(place, align=ALIGNMENT) for place in places])
 
 
 def _code_of_store(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
-    builder.store(values[2], _place(context, builder, kinds, values, kinds.args[2]), align=ALIGNMENT)
+    for i, place in enumerate(_places(context, builder, kinds, values, kinds.args[2])):
+        builder.store(builder.extract_value(values[2], i), place, align=ALIGNMENT)
     return context.get_dummy_value()
 
 
-def _numbers(builder: Any, vector: Any) -> list[Any]:
-    return [builder.extract_element(vector, INDEX(i)) for i in range(vector.type.count)]
+def _numbers(builder: Any, kind: Any, vector: Any) -> list[Any]:
+    return [builder.extract_element(quad, INDEX(i))
+            for quad in _quads(builder, kind, vector, kind.width // HALF) for i in range(HALF)]
 
 
-def _code_of_highest(_: Any, builder: Any, __: Any, values: Any) -> Any:
-    found = _numbers(builder, values[0])
+def _code_of_highest(_: Any, builder: Any, kinds: Any, values: Any) -> Any:
+    found = _numbers(builder, kinds.args[0], values[0])
     while len(found) > 1:  # in pairs: none waits for all before it
         found = [builder.select(builder.fcmp_ordered(">", a, b), a, b)
                  for a, b in zip(found[::2], found[1::2], strict=True)]
@@ -106,7 +119,7 @@ def _code_of_highest(_: Any, builder: Any, __: Any, values: Any) -> Any:
 
 
 def _code_of_numbers(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
-    return context.make_tuple(builder, kinds.return_type, _numbers(builder, values[0]))
+    return context.make_tuple(builder, kinds.return_type, _numbers(builder, kinds.args[0], values[0]))
 
 
 def _code_of_sum(builder: Any, total: Any, vector: Any, factor: Any) -> Any:
