@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from exact.bench import bench
 
+from grasp_ros import scene
 from grasp_ros.exact.driver.energy_check import check_segment, energy_level
+from grasp_ros.exact.integrator import Status
 from grasp_ros.exact.records import Level
 from grasp_ros.physics.impact_law import stored_energy
 from grasp_ros.physics.layout import EPS, LEFT, RIGHT, Body, Law, Of, Outcome, Pair, U, X
 from grasp_ros.physics.system import COLUMN
+from grasp_ros.simulation import simulate
 
 SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
 OPEN = (Pair.OPEN, Pair.OPEN)
@@ -67,6 +71,29 @@ def test_energy_comes_from_nowhere_and_goes_nowhere(side: Body, change: float, e
     begin = Level(after.value - change, after.size, -0.1, -0.1)
     found = check_segment(b.plant, b.state, b.settings, begin, after, 0.01, 0, OPEN)
     assert found == expected
+
+
+@SIDES
+@pytest.mark.parametrize(("accuracy", "change", "expected"), [
+    (1e-6, 0.9e-3, Outcome.GO_ON), (1e-6, 1.1e-3, Outcome.ENERGY_RISES), (1e-3, 0.09, Outcome.GO_ON),
+    (1e-3, 0.11, Outcome.ENERGY_RISES), (1e-3, -0.11, Outcome.ENERGY_FALLS)])
+def test_an_accuracy_explains_a_thousand_times_itself_and_never_more_than_a_tenth(
+        side: Body, accuracy: float, change: float, expected: Outcome) -> None:
+    b = bench(side, -0.1, 0.5, p=0.0)
+    settings, after = b.settings._replace(tolerance=accuracy), energy_level(b.plant, b.state, 0.01)
+    begin = Level(after.value - change * after.size, after.size, -0.1, -0.1)
+    assert check_segment(b.plant, b.state, settings, begin, after, 0.01, 0, OPEN) == expected
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-5, 1e-7, 1e-9])
+@pytest.mark.parametrize("angle", [-0.1, 0.5])
+def test_bodies_that_touch_and_are_set_moving_have_missed_no_touch(accuracy: float, angle: float) -> None:
+    case = scene.load("case_01", [
+        "left_arm.position_m=0", "right_arm.position_m=0", f"tilt.angle_rad={angle}", "tilt.gravity_m_per_s2=9.81"])
+    grid = np.array([0.5])
+    run, truth = simulate(case, setting=accuracy, grid=grid), simulate(case, grid=grid)
+    assert run.status is Status.DONE
+    assert run.state == pytest.approx(truth.state, rel=100.0 * accuracy, abs=100.0 * accuracy)
 
 
 @SIDES

@@ -8,7 +8,7 @@ from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.kinematics import arm_of, reduced_mass
 from grasp_ros.exact.records import Array, Level, Plant, Settings, State
-from grasp_ros.exact.tolerances import DIED_OUT, ENERGY, ENERGY_UNDERFLOW, MAX_IDLE, NEGLECTED
+from grasp_ros.exact.tolerances import BELIEVED, DIED_OUT, ENERGY, ENERGY_UNDERFLOW, MAX_IDLE, NEGLECTED
 from grasp_ros.physics.body_energy import body_energy
 from grasp_ros.physics.domain import LARGEST_POSITION, LARGEST_SPEED
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Law, Of, Outcome, Pair, U, V, X
@@ -69,8 +69,8 @@ def losses(plant: Plant, before: Level, modes: tuple[int, int], size: float, t: 
 
 
 @inlined
-def penetrates(plant: Plant, state: State, side: Body, before: float, size: float, t: float) -> bool:
-    """Whether an open pair is closed by more than the roundings of its ways in t s: a touch has been missed.
+def penetrates(plant: Plant, state: State, side: Body, before: float, size: float, t: float, part: float) -> bool:
+    """Whether an open pair is closed by more than roundings and a `part` of its ways in t s: a touch has been missed.
 
     A body goes no faster than the energy `size` allows. What has DIED_OUT is not followed. A u > 0 that was there
     `before` is no missed touch: roundings of a longer way may have left it.
@@ -79,8 +79,8 @@ def penetrates(plant: Plant, state: State, side: Body, before: float, size: floa
     if state.mode[side] != Pair.OPEN or u <= max(before, 0.0):
         return False
     fastest = math.sqrt(size / plant.given[side, Of.MASS]) + math.sqrt(size / plant.given[OBJECT, Of.MASS])
-    way = abs(arm_of(state.y, side)[0]) + abs(state.y[X.O]) + t * fastest
-    return u > ENERGY * EPS * way + DIED_OUT
+    place = abs(arm_of(state.y, side)[0]) + abs(state.y[X.O])
+    return u > ENERGY * EPS * place + part * t * fastest + DIED_OUT
 
 
 @inlined
@@ -105,9 +105,11 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
         return Outcome.OUTSIDE
     if idle > MAX_IDLE:
         return Outcome.STALLED
-    if penetrates(plant, state, LEFT, before.u_l, size, t) or penetrates(plant, state, RIGHT, before.u_r, size, t):
+    part = ENERGY * EPS + min(NEGLECTED * settings.tolerance, BELIEVED)
+    if (penetrates(plant, state, LEFT, before.u_l, size, t, part)
+            or penetrates(plant, state, RIGHT, before.u_r, size, t, part)):
         return Outcome.PENETRATES
-    rounding = (ENERGY * EPS + NEGLECTED * settings.tolerance) * size + ENERGY_UNDERFLOW
+    rounding = part * size + ENERGY_UNDERFLOW
     driven = plant.given[LEFT, Of.DAMPING] < 0.0 or plant.given[RIGHT, Of.DAMPING] < 0.0
     if driven or not abs(rise) > rounding:  # nan where energies overflow before the state does
         return Outcome.GO_ON
