@@ -2,27 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
+from functools import cache
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-UNCHANGEABLE = frozenset({bool, int, float, str, type(None)})
+
+def _read_only(array: Any) -> Any:
+    view = array.view()
+    view.setflags(write=False)
+    return view
+
+
+def _unchangeable(mapping: Any) -> Any:
+    return MappingProxyType({key: frozen(entry) for key, entry in mapping.items()})
+
+
+def _frozen_record(record: Any) -> Any:
+    return type(record)(*map(frozen, record))
+
+
+@cache
+def _freezer(kind: type) -> Callable[[Any], Any] | None:
+    """What freezes values of a type, asked once for each: a short run feels every question; None: nothing changes."""
+    if issubclass(kind, np.ndarray):
+        return _read_only
+    if hasattr(kind, "items"):
+        return _unchangeable
+    return _frozen_record if issubclass(kind, tuple) and hasattr(kind, "_fields") else None
 
 
 def frozen(value: Any) -> Any:
     """The same value, read-only: arrays as a view, mappings as a copy."""
-    if isinstance(value, np.ndarray):
-        view = value.view()
-        view.setflags(write=False)
-        return view
-    if hasattr(value, "items"):  # a mapping; to ask for its abstract class would cost a short run a tenth
-        return MappingProxyType({key: frozen(entry) for key, entry in value.items()})
-    if isinstance(value, tuple) and hasattr(value, "_fields"):
-        return type(value)(*map(frozen, value))
-    return value
+    freeze = _freezer(type(value))  # type: ignore[arg-type]  # of a cache
+    return freeze(value) if freeze else value
 
 
 def _thawed(value: Any) -> Any:
@@ -64,7 +80,7 @@ class Frozen:
     def __post_init__(self) -> None:
         """Freeze all fields."""
         own = vars(self)
-        own.update({name: frozen(value) for name, value in own.items() if type(value) not in UNCHANGEABLE})
+        own.update({name: freeze(value) for name, value in own.items() if (freeze := _freezer(type(value)))})  # type: ignore[arg-type]
 
     def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
         """A new record of the same fields."""
