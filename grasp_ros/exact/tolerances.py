@@ -1,7 +1,7 @@
 """Tolerances: the bounds by which a rounding, or what an accuracy may neglect, decides; each with its reason.
 
-What a search or a gap knows to a few roundings of its own terms stands where it is used, and so do bounds that only
-save work, such as how long a search goes on in one way.
+Bounds of a few roundings of the terms at hand stand where they are used, and so do bounds that only save work, such as
+the number of iterations after which a search changes its method.
 """
 
 from __future__ import annotations
@@ -10,13 +10,15 @@ from grasp_ros.physics.layout import EPS
 
 # Events and modes.
 TOGETHER = 1.0 + 4.0 * EPS  # events closer than this happen together: their times are sums of a few roundings
-DERIVATIVE = 64.0 * EPS  # of the sum of its terms: a derivative below it is none, it is their cancellation
+DERIVATIVE = 64.0 * EPS  # of the sum of the sizes of its terms: a smaller derivative counts as 0, as their rounding
 SURFACE = 4.0  # roundings of the terms of 1 + p u', within which a pair is at u' = -1/p
-BEYOND = 2.0 * SURFACE  # the same below -1/p: there a pair is clamped that was at it, as where its force dies out
-SURFACE_DRIFT = 1024.0  # the same after flights, which leave roundings in u'
+BEYOND = 2.0 * SURFACE  # roundings below -1/p, where a pair that was at -1/p has its CLAMP: its force may only die out
+SURFACE_DRIFT = 1024.0  # as SURFACE, after flights, which leave roundings in u'
 FRICTION = 16.0 * EPS  # of the terms of what holds an object: of a force, and of a state that rests under it
 LEFT_OUT = 0.25  # impulse of a pair that leaves without force, in units of the accuracy
-TURNS, CLAMPS = 20.0, 4.0  # times what u' may change before u = 0: both terms, and those behind them
+# Times the larger of the first two Taylor terms of the change of u' until u = 0. A pair whose |u'| is more does not
+# turn back; one whose u' is farther from -1/p is not clamped. The factors cover the other terms.
+TURNS, CLAMPS = 20.0, 4.0
 
 # The begin of a contact without its force.
 HELD = 2.0**-56  # of the impulse of a motion, which a pair may leave out: an eighth of a rounding
@@ -36,7 +38,7 @@ DEFECT = 100.0  # times accuracy and rounding: what neglected terms may leave of
 NOISE = 100.0 * EPS  # of a polynomial with some tens of terms
 STILL = 2.0**-4  # of a rounding of the fastest velocity: what a step may neglect of each
 CANCELS = 16.0  # times u' at both ends: if its terms are larger, u' at the end of a relaxation is their rounding
-DECAYS = 2.0  # time constants of a damper in a step: e^2 is by how much terms that cancel exceed what is left
+DECAYS = 2.0  # time constants of a damper that a step may span: terms that cancel are then e^2 times what is left
 
 # The check of a segment.
 ENERGY = 128.0  # roundings of the sum of all terms: flights, impacts and differences of positions

@@ -140,11 +140,11 @@ class Systems:
     def impulses(self) -> Array:
         """Largest p J / mu, (n, 2): J from the approach, a start pressed in, and constant forces over the duration.
 
-        A pair under the force F relaxes with the rate p F / mu, so that this counts relaxation times: p v of an impact
-        at v that loses all of it, p F t / mu where F presses for a time t.
+        A pair pressed by the force F relaxes at the rate p F / mu, so this counts relaxation times: p F t / mu where F
+        presses for a time t, and p v for an impact at v that loses all of v.
         """
         loss = self._pairs[..., Law.DISSIPATION]
-        outward = np.minimum(self._duration, 0.4 * loss * np.maximum(-self.gap, 0.0))  # s, it parts with 1/p
+        outward = np.minimum(self._duration, 0.4 * loss * np.maximum(-self.gap, 0.0))  # s, separating at 1/p
         force = self.elastic * outward + self.pressed * self._duration
         return loss * self.touching * (self.speed[:, :OBJECT] + self.speed[:, OBJECT:] + force / self.reduced)
 
@@ -179,24 +179,24 @@ def _arms(key: str) -> tuple[str, ...]:
 
 RULES = (
     Rule("gap or depth of a pair, in roundings of the largest position", PART, np.inf, "",
-         f"the positions do not tell a smaller one; nor is any below {SMALLEST:g} m told", _arms("arm.position_m"),
-         Systems.gaps),
+         f"a smaller one cannot be told from 0 beside the positions, nor can one below {SMALLEST:g} m",
+         _arms("arm.position_m"), Systems.gaps),
     Rule("relative speed of a pair without a gap, in roundings of the largest speed", PART, np.inf, "",
-         f"the velocities do not tell a smaller one; nor is any below {SMALLEST:g} m/s told",
+         f"a smaller one cannot be told from 0 beside the velocities, nor can one below {SMALLEST:g} m/s",
          _arms("arm.velocity_m_per_s"), Systems.closing),
     Rule("mass of the arm / mass of the object", 1e-12, 1e12, "",
-         "four digits of a velocity are left for what an impact moves the heavier one", _arms("arm.mass_kg"),
+         "four digits are left of the velocity that an impact gives the heavier body", _arms("arm.mass_kg"),
          Systems.masses),
     Rule("sqrt(k/m) of a body x duration", 0.0, 1e12, "",
-         "one rounding of the rate turns the phase at the end by 1e-4", ("time.duration_s",) * 3, Systems.turns),
-    Rule("speed that a body reaches by its spring and constant force", 0.0, 1e10, "m/s",
+         "one rounding of sqrt(k/m) shifts the phase at the end by 1e-4", ("time.duration_s",) * 3, Systems.turns),
+    Rule("speed that a body reaches by its start, spring and constant force", 0.0, 1e10, "m/s",
          "a hundredth of what a run may reach", ("left_arm.mass_kg", "right_arm.mass_kg", "object.mass_kg"),
          Systems.speeds),
-    Rule("speed at which a pair that starts pressed in parts", 0.0, 1e10, "m/s",
+    Rule("speed at which a pair that starts pressed in separates", 0.0, 1e10, "m/s",
          "a hundredth of what a run may reach", _arms("arm.position_m"), Systems.thrown),
     Rule("p J / mu of a pair, with J its impulse and mu its reduced mass", 0.0, 1e8, "",
-         "it takes a fifteenth of that in Taylor steps, some ten seconds", _arms("contact.dissipation_s_per_m"),
-         Systems.impulses),
+         "at the bound a run takes a fifteenth as many Taylor steps, some ten seconds",
+         _arms("contact.dissipation_s_per_m"), Systems.impulses),
 )
 
 

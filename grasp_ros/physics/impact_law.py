@@ -4,10 +4,10 @@
 
 u > 0 is penetration, u' > 0 approach, H in N/m^1.5, p in s/m. Each function works on floats and on NumPy arrays, and
 `exact.impact` compiles the same source for the kernels. `model.impact_force` puts the parts together for any u and u'.
-What else follows from the exponent: powers of w in `exact.contact.series` and `sensitivity.base_series`, scales of an
-impact in `exact.contact.step_unit`, the time of one in `domain`, the bounds of `reach`, and the quotients of
-`methods.discrete_gradient`.
-docs/oracles.md has what proves the law.
+Another exponent also changes powers of w in `exact.contact.series` and `sensitivity.base_series`, a mean slope in
+`sensitivity.propagate`, the scales of an impact in `exact.contact.step_unit`, the impulse in `domain`, the bounds of
+`reach`, the quotients of `methods.discrete_gradient`, and the key of H with its unit and texts in
+`scene.effects.contact`. docs/oracles.md has what tests the law.
 
 References
 ----------
@@ -22,7 +22,7 @@ import numpy as np
 
 
 def elastic_force(hertzian: Any, u: Any) -> Any:
-    """H u^(3/2) in N, for u >= 0 in m. Two factors: a product of halves scales by powers of 4 without rounding."""
+    """H u^(3/2) in N, for u >= 0 in m; as u sqrt(u), which a factor of 4 in u multiplies by 8 without rounding."""
     return hertzian * (u * np.sqrt(u))
 
 

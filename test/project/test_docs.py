@@ -36,7 +36,7 @@ def anchors(page: Path) -> set[str]:
 def test_reference_is_what_the_code_says() -> None:
     """Written by `python -m lab.site`."""
     for page, text in written().items():
-        assert page.read_text(encoding="utf-8") == text, page
+        assert page.read_text(encoding="utf-8") == text, f"{page}: write it with python -m lab.site"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

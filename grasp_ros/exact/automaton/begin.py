@@ -1,7 +1,7 @@
 """The begin of a contact that the regularised time cannot begin: it stops where w_l w_r = 0, and where u = u' = 0.
 
-Such a pair is BEGINNING: it moves without its force for as long as the impulse that this leaves out is below a part
-HELD of that of its motion, or of the velocities of its bodies, whose roundings are as large.
+Such a pair is BEGINNING: it moves without its force for as long as the impulse left out is below HELD mu v, where mu is
+its reduced mass and v the largest of |u'| and the speeds of its two bodies. Roundings of these velocities are larger.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ def must_begin(state: State, side: Body) -> bool:
 def force_free_time(f: Array, plant: Plant, state: State, side: Body) -> float:
     """Time in s, a power of two, for which a pair at u = 0 that begins may fly without its force.
 
-    It is looked for from near the begin on, up to where the pair turns back, so that its end has the largest force; inf
-    where nothing moves the pair. The series of u is written to f.
+    The search multiplies a tiny time until the force left out is too large or u' changes its sign: up to there the
+    force is largest at the end. inf where nothing moves the pair. The series of u is written to f.
     """
     y = state.y
     if state.mode[side] != Pair.BEGINNING or write_own_series(plant, y, side, f) == 0.0:
@@ -62,11 +62,11 @@ def speed_of_pair(y: Array, side: Body) -> float:
 
 @kernel
 def leaves_force_out(plant: Plant, side: Body, u: float, d: float, speed: float) -> bool:
-    """Whether a pair that begins may have come to u and u' without its force, with this speed of its bodies."""
+    """Whether a pair that begins may have moved to u, u' = d without its force; speed is the larger of its bodies."""
     d = abs(d)
     if u <= 0.0 or d == 0.0:
         return u <= 0.0
     pair, motion = plant.pairs[side], reduced_mass(plant.bodies, side) * max(d, speed)
     force = elastic_force(pair[Law.HERTZIAN], u) * damping_factor(pair[Law.DISSIPATION], d)
-    hidden = plant.coulomb == 0.0 or force <= HELD * plant.coulomb  # of an object that sticks the force decides
+    hidden = plant.coulomb == 0.0 or force <= HELD * plant.coulomb  # a stuck object slips by the force, not the impulse
     return bool(hidden and force * (u / d) <= HELD * motion)

@@ -1,8 +1,8 @@
 """A pair on the edge of a mode: which way it goes, how long that is certain, and whether its force matters.
 
-At u = u' = 0, and at u' = -1/p, where its force ends. Each body obeys m x'' + c x' + k x = f, so its derivatives follow
-from each other, and the first one in which arm and object differ decides. Their motion relative to each other obeys an
-equation of order five: no difference up to order six means that they move together for ever.
+The edges are u = u' = 0, and u' = -1/p, where the force ends. Each body obeys m x'' + c x' + k x = f, so its
+derivatives follow from each other, and the first one in which arm and object differ decides. Their motion relative to
+each other obeys an equation of order five: no difference up to order six means that they move together for ever.
 """
 
 from __future__ import annotations
@@ -51,8 +51,9 @@ def impact_beside(plant: Plant, state: State, side: Body) -> tuple[float, float]
 def leaning(plant: Plant, state: State, side: Body) -> Leaning:
     """The first derivative of u of a pair at rest that differs from zero by more than its rounding.
 
-    The force of the other pair takes part with its value and its rate. Where that pair begins at u = 0, too, and
-    nothing else decides, the force that it is going to have closes this one.
+    If the other contact pushes, its force and the rate of its force are part of the derivatives 2 and 3, and no higher
+    one is known. If the other pair is at its begin and no derivative differs from zero, the force that it is going to
+    have closes this one.
     """
     y, beside = state.y, other(side)
     closed = state.mode[beside] in (Pair.CONTACT, Pair.BEGINNING) and plant.bodies[OBJECT, Of.MASS] < math.inf
@@ -67,7 +68,7 @@ def leaning(plant: Plant, state: State, side: Body) -> Leaning:
 
 @kernel
 def first_difference(plant: Plant, y: Array, side: Body, push: float, pace: float, highest: int) -> Leaning:
-    """The first derivative of u beyond its rounding, with an acceleration of the object and its rate added; NEVER."""
+    """The first derivative of u beyond its rounding, or NEVER; `push` is a further acceleration, `pace` its rate."""
     drag = plant.bodies[OBJECT, Of.DAMPING] / plant.bodies[OBJECT, Of.MASS]
     for order in range(LOWEST, highest + 1):
         value, size = difference(plant, y, side, order)
@@ -112,9 +113,9 @@ def write_own_series(plant: Plant, y: Array, side: Body, f: Array) -> float:
 
 @kernel
 def is_negligible(plant: Plant, side: Body, u: float, d: float, part: float) -> bool:
-    """Whether the impulse of a pair between u = 0 and u is below a part of that of its motion u'.
+    """Whether the impulse of a pair between u = 0 and u is below a part of mu u', with the reduced mass mu.
 
-    What decides about an object that sticks is the force.
+    If the object sticks the force itself must be negligible, too: whether the object slips depends on it.
     """
     pair, d = plant.pairs[side], abs(d)
     if u <= 0.0 or d == 0.0:
@@ -166,7 +167,7 @@ def parting_time(f: Array, plant: Plant, state: State, side: Body, work: Integer
 
 @kernel
 def surface_side(plant: Plant, state: State, side: Body) -> float:
-    """1 + p u', which is positive in contact; within its rounding, where no force acts, what moves u' first; or 0."""
+    """1 + p u', positive in contact; if that is within its rounding, the first derivative of u' that is not 0, or 0."""
     factor = surface_factor(plant.pairs, state.y, side, SURFACE)
     if factor != 0.0:
         return float(factor)

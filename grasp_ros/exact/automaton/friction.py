@@ -42,7 +42,7 @@ def apply_friction(plant: Plant, mode: Integers) -> None:
 
 @kernel
 def impact_noise(plant: Plant, side: Body, elastic: float, y: Array) -> float:
-    """Rounding of an impact, of its own terms alone; of 1 + p u', which may have cancelled, these count."""
+    """Rounding of an impact force, from its own terms; those of 1 + p u' count by their sizes, as they may cancel."""
     front, back = rate_lanes(side)
     return 0.5 * FRICTION * (elastic * (1.0 + plant.pairs[side, Law.DISSIPATION] * (abs(y[front]) + abs(y[back]))))
 
@@ -63,10 +63,9 @@ def impact_on_object(plant: Plant, state: State, side: Body) -> Push:
 
 @kernel
 def push_on_object(plant: Plant, state: State) -> Push:
-    """What pushes the object beside its dry friction, by (3), and the rounding of that and of the friction.
+    """The force on the object without its dry friction, by (3), and the rounding of this force and of the friction.
 
-    This decides about an object at rest, wherever it is asked: it slides if the push exceeds the limit of the friction
-    by more than the rounding.
+    An object at rest slides if the force exceeds the limit of the friction by more than the rounding.
     """
     value, rounding = 0.0, 0.0  # of both sides first, for mirror images
     for side in (LEFT, RIGHT):
@@ -95,7 +94,7 @@ def slide_in_flight(plant: Plant, state: State) -> Candidate:
 def impact_series(tables: Tables, plant: Plant, mode: Integers, n: int) -> None:
     """Write the series of the impact forces on the object up to the order n to `tables.row`.
 
-    The table of factors is free after the expansion.
+    `tables.f`, free after the expansion of the step, is scratch.
     """
     f, row = tables.f, tables.row
     for k in range(n + 1):
@@ -109,7 +108,7 @@ def impact_series(tables: Tables, plant: Plant, mode: Integers, n: int) -> None:
 
 @kernel
 def noise_at(tables: Tables, plant: Plant, mode: Integers, n: int, s: float) -> float:
-    """Rounding of what pushes an object at rest at s in a Taylor step; the state there is left in `tables.at`."""
+    """Rounding of the force on an object at rest, at s in a Taylor step; leaves the state there in `tables.at`."""
     at = tables.at
     values(tables.c, n, s, at)
     noise = 0.0  # of both sides first, for mirror images
@@ -122,13 +121,13 @@ def noise_at(tables: Tables, plant: Plant, mode: Integers, n: int, s: float) -> 
 
 @inlined
 def excess(tables: Tables, plant: Plant, n: int, s: float) -> float:
-    """By how much what pushes the object at s, with the impacts `tables.row`, exceeds the friction, N."""
+    """By how much the force on the object at s, with the impacts `tables.row`, exceeds its friction, N."""
     return abs(value_and_rate(tables.row, n, s)[0] + plant.given[OBJECT, Of.FORCE]) - plant.coulomb
 
 
 @kernel
 def since_certain(tables: Tables, plant: Plant, mode: Integers, n: int, h: float) -> Candidate:
-    """Since when a push exceeds the friction by more than its rounding, as it does at h."""
+    """From which s on the force exceeds the friction by more than the rounding, as it does at h; by bisection."""
     low, high = 0.0, h
     while high - low > 4.0 * EPS * high and high > EPS * EPS * h:
         middle = 0.5 * (low + high)
@@ -142,9 +141,9 @@ def since_certain(tables: Tables, plant: Plant, mode: Integers, n: int, h: float
 
 @kernel
 def overcome(f: Array, n: int, h: float, noise: tuple[float, float], work: Integers) -> float:
-    """First s in (0, h] at which f, a push less the friction, exceeds the rounding of f.
+    """First s in (0, h] at which f, the force less the friction, exceeds the rounding of f.
 
-    `noise` is that at 0 and at h. Where f(0) is within its rounding, that counts, and otherwise the smaller one.
+    `noise` is the rounding at 0 and at h. If |f(0)| is within the one at 0, that one counts, otherwise the smaller one.
     """
     if f[0] > noise[0]:
         return EPS * EPS * h
@@ -157,7 +156,7 @@ def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, noise: tuple[
                    ) -> Candidate:
     """First s in (0, h] at which an impact on a stuck object, `tables.row` in N, overcomes the friction.
 
-    `noise` is the rounding of what pushes it at 0 and at h.
+    `noise` is the rounding of the force on it, at 0 and at h.
     """
     row, copy = tables.row, tables.copy
     push = row[0] + plant.given[OBJECT, Of.FORCE]
@@ -174,8 +173,9 @@ def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, noise: tuple[
 def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: float, work: Integers) -> Candidate:
     """First s in a Taylor step of length h at which an object under dry friction stops or slips.
 
-    `tables.at` is at h, or lost. Of an object that has just slipped, at rest, an acceleration below half of its
-    rounding counts as 0, so that the next order decides. The rounding of a push may be far less at h than at 0.
+    Afterwards `tables.at` may hold the state at another s than h. An object that has just slipped is still at rest: if
+    its acceleration is below half of its rounding it counts as 0, so that the next order decides. The rounding of the
+    force is computed at 0 and at h, because it may be far smaller at h.
     """
     slide, row, c = state.mode[OBJECT], tables.row, tables.c
     if slide != Slide.STUCK:
@@ -198,7 +198,7 @@ def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: floa
     if begin < -noise:
         if end > later:
             return found
-        impact_series(tables, plant, state.mode, n)  # it is near the friction without exceeding it for certain
+        impact_series(tables, plant, state.mode, n)  # near the friction, not for certain above it
     found = slip_candidate(tables, plant, n, h, (noise, later), work)
     if -noise <= begin <= noise and (found.when <= h or end > later):
         impact_series(tables, plant, state.mode, n)

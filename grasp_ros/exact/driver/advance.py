@@ -113,12 +113,12 @@ def advance(
     grid, rows, events, filled, work, observer : arrays (n,), (n, 6), (m, 5), (2,), (4,) and (2,)
         `records.Output`, filled in place; output times in s from the begin of their interval.
     driven : tuple
-        Fields of a `records.Loop`, updated in place: to know a record that comes from Python, numba takes 4 us.
+        Fields of a `records.Loop`, updated in place; as a tuple, because numba takes 4 us to recognise a record.
 
     Returns
     -------
     int
-        Value of a `layout.Outcome`: to make a member of an enum for Python costs a microsecond. If it is none of DONE,
+        Value of a `layout.Outcome`, because an enum member would cost a microsecond. If it is none of DONE,
         EVENTS_FULL, WORK_BUDGET and NO_COMMAND, `rows` holds nothing of the segment that failed.
     """
     tables, plant, state = tables_in(block, order), plant_in(plant_block), state_in(state_block, mode)

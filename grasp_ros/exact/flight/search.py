@@ -4,11 +4,11 @@ With |g''| <= M for all later times,
 
     g(t + h) <= g(t) + g'(t) h + M h^2 / 2,
 
-so up to the zero of the right-hand side g stays negative. The steps approach the first root from the left until the
-bounds show that g rises to it all the way; then the series of g about that time has the same root. Where arm and object
-move nearly alike their accelerations cancel, and a bound on the third derivative allows longer steps. Where the arm's
-whole remaining swing cannot reach the object, the envelope of the swing allows a longer step, or proves that no root
-exists.
+so g stays negative up to the zero of the right-hand side. Steps to that zero approach the first root from the left.
+Once the bounds show that g rises up to the root, the root is that of the Taylor series of g about the time reached.
+Longer steps are possible where the accelerations of arm and object nearly cancel, by a bound on the third derivative;
+and where the arm cannot reach the object in all its remaining swing, by the envelope of the swing, which may also prove
+that there is no root.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class EventSeries(NamedTuple):
 
 @kernel
 def motion_at(pair: PairFlight, t: float) -> Motion:
-    """Where arm and object are after t seconds of flight; u of a short one without the common digits of the places."""
+    """Where arm and object are after t seconds of flight; in a short flight u is that at its begin plus both ways."""
     x, v, away, _ = fly(pair.arm_flight, t)
     x_o, v_o, away_o, _ = fly(pair.body_flight, t)
     d, moved = pair.sign * (v - v_o), pair.sign * (away - away_o)
@@ -103,7 +103,7 @@ def relative_bound(pair: PairFlight, q: float, q_rate: float, q_o: float, q_o_ra
 
 @inlined
 def certain_step(g: EventSeries, curvature: float, growth: float, last: float) -> float:
-    """Time for which g stays below 0: by the bound on |g''|, or for as long as g'' can change little."""
+    """Time for which g stays below 0: by the bound on |g''|, or by g'' now and its largest change if that is longer."""
     below = min(g.value, -g.noise)
     step = safe_step(below, g.rate, curvature)
     reach = min(4.0 * max(step, last), 1.0 / SMALLEST)  # finite: `growth` may be 0
@@ -115,7 +115,7 @@ def certain_step(g: EventSeries, curvature: float, growth: float, last: float) -
 
 @inlined
 def reach_of_root(g: EventSeries, growth: float, left: float) -> float:
-    """Time within which g has its only root, because g' keeps half of its size so long; 0 if that is not known."""
+    """Time within which g has exactly one root, as g' keeps half of its size until then; 0 if that is not known."""
     if not (g.value < 0.0 and g.rate > SMALLEST):
         return 0.0
     reach = -2.0 * g.value / g.rate
@@ -143,8 +143,8 @@ def root_between(kind: Transition, pair: PairFlight, low: float, high: float, g:
                  work: Integers) -> float:
     """The root in (low, high] of a function that rises there; g is its series at low.
 
-    The step to the root of the series is the last one if what the series neglects, of fifth order, is less than a few
-    roundings of the time. Where the series does not lead into the interval its middle does.
+    Each step goes to the root of the series, or to the middle of the interval if that root lies outside. It is the last
+    one if the first neglected term, of fifth order, shifts the root by no more than a few roundings of the time.
     """
     t = low
     for _ in range(MAX_REFINEMENTS):
@@ -186,8 +186,8 @@ def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: f
     Returns
     -------
     float, float
-        That time; and, where the search was given up, the time that it has reached, otherwise inf. A pair that swings
-        within a rounding of a touch would keep it for the whole flight.
+        That time; and the time that the search has reached if it was given up, otherwise inf. It is given up after
+        MAX_ITERATIONS, because a pair that swings within a rounding of a touch would keep it busy for the whole flight.
     """
     step = 0.0
     for _ in range(MAX_ITERATIONS):
