@@ -98,8 +98,8 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
     except Refused as error:
         print(shortened(f"grasp: {error}"), file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        print("grasp: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as stop:
+        print(f"grasp: interrupted{stop}", file=sys.stderr)
         return 130
     except Exception as error:
         if not hasattr(error, "__notes__"):  # which an error of a user's controller has
