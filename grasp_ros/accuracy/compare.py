@@ -72,7 +72,7 @@ def fastest(records: Iterable[Record], error: float) -> Record | None:
 def advise(records: Iterable[Record], error: float | None = None, budget: float | None = None) -> Advice:
     """The fastest setting that reaches an error in m and m/s, or the most accurate one within a budget in s.
 
-    Runs of one scene are given; those that miss touches or stop early are no choice.
+    Runs of one scene are given; those that count touches wrongly or stop early are no choice.
     """
     check_wish(error, budget)
     sound = [record for record in records if record.sound]

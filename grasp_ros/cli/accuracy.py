@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from grasp_ros.accuracy.compare import SECONDS, Advice, advise, by_method, check_wish, compare, fastest
-from grasp_ros.accuracy.contender import own_contenders
+from grasp_ros.accuracy.contender import DONE, own_contenders
 from grasp_ros.accuracy.measure import Record
 from grasp_ros.accuracy.truth import Truth, finest
 from grasp_ros.cli.arguments import add_command, add_file, add_json, add_scene
@@ -70,7 +70,7 @@ def _not_here(others: Mapping[str, str]) -> list[str]:
 
 
 def _table(truth: Truth, records: Sequence[Record]) -> list[str]:
-    """A line for each method: milliseconds to some errors, its best error, and what it missed."""
+    """A line for each method: milliseconds to some errors, its best error, and how often it fails."""
     heads = "".join(f"{f'<= {target:.0e}':>11}" for target in TARGETS)
     lines = [
         f"truth: exact at its finest, known to {truth.uncertainty:.1e} m and m/s in double precision",
@@ -80,11 +80,12 @@ def _table(truth: Truth, records: Sequence[Record]) -> list[str]:
         found = [fastest(group, target) for target in TARGETS]
         cells = "".join(f"{'-' if record is None else f'{1e3 * record.time:.3g}':>11}" for record in found)
         best = min((record for record in group if record.sound), key=lambda record: record.error or 0.0, default=None)
-        end = f"{'-':>12}  {group[-1].status}" if best is None else (
+        failed = "no usable run" if group[-1].status == DONE else group[-1].status
+        end = f"{'-':>12}  {failed}" if best is None else (
             f"{best.error:>12.1e}  {best.knob} {best.setting:g}{UNITS[best.knob]}")
         unsound = sum(not record.sound for record in group)
-        lines.append(f"{name:<20}{cells}{end}" + (f"; {unsound} of {len(group)} runs stop or miss touches" if unsound
-                                                  else ""))
+        wrong = f"; {unsound} of {len(group)} runs stop or count touches wrongly" if unsound else ""
+        lines.append(f"{name:<20}{cells}{end}{wrong}")
     return lines
 
 

@@ -131,6 +131,9 @@ def _run(options: argparse.Namespace) -> int:
     except (GraphError, BagError) as error:
         print(f"grasp: {error}{_what_is_there(graph.bag)}", file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt("" if _is_without_ticks(graph.bag) else f"; {graph.bag} was not checked to the end and"
+                                " not drawn; `grasp verify` and `grasp plot` do that") from None
     except Refused:
         if graph.processes and _is_without_ticks(graph.bag):  # a node refused what it was given
             shutil.rmtree(directory, ignore_errors=True)

@@ -23,7 +23,7 @@ from grasp_ros.cli.commands import COMMANDS, overview
 from grasp_ros.cli.parser import Command, Parser, add_levels, shortened
 from grasp_ros.graph.bag.disk import FULL
 from grasp_ros.graph.stopping import raise_on_signals, stop_if_signalled
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Refused, described
 
 HELP = f"""\
 Simulate, run, inspect and draw a grasp that collides.
@@ -61,7 +61,7 @@ def run(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str]) -> 
         enough = isinstance(error, BrokenPipeError)  # the reader of our output, `head` say, has had it
         lost = error.errno in FULL or hasattr(error, "characters_written")  # the second one: full, and nobody waits
         of_output = enough or lost or error.errno in (errno.EIO, errno.EBADF)  # EIO: the terminal is gone
-        if not of_output or hasattr(error, "__notes__"):  # which an error of a user's controller has
+        if not of_output:
             raise
         if lost:
             with suppress(OSError):
@@ -98,9 +98,14 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
     except Refused as error:
         print(shortened(f"grasp: {error}"), file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        print("grasp: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as stop:
+        print(f"grasp: interrupted{stop}", file=sys.stderr)
         return 130
+    except Exception as error:
+        if not hasattr(error, "__notes__"):  # which an error of a user's controller has
+            raise
+        print(shortened(f"grasp: {error.__notes__[0]}: {described(error)}"), file=sys.stderr)
+        return 1
 
 
 def _check_directory() -> None:

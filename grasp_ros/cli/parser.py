@@ -10,7 +10,7 @@ from contextlib import suppress
 from typing import Any, NoReturn
 
 Command = Callable[[argparse.Namespace], int]
-LONGEST = 200  # characters of a line that refuses something
+LONGEST = 250  # characters of a line that refuses something
 
 
 def shortened(line: str) -> str:

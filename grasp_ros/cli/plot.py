@@ -140,7 +140,7 @@ def _draw(found: Sensitivity, place: int, axes: Axes, _: Motion) -> None:
         axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(np.median(sizes))))
         axes.locator_params(axis="y", numticks=7)
     for body in found.scene.system.present:
-        axes.plot(found.t, rates[:, COLUMN[body] // 2], label=f"$dx_{NAMES[body][0]}$", color=plots.COLORS[body],
+        axes.plot(found.t, rates[:, COLUMN[body] // 2], label=f"x_{NAMES[body]}", color=plots.COLORS[body],
                   linewidth=1.0)
     if found.corner is not None:
         axes.axvline(found.corner, color="black", linewidth=0.8, linestyle=":", label="one-sided from here")

@@ -36,6 +36,7 @@ GOOD = 4.0  # mean square of residuals, in those of the noise, above which a sea
 ROUGH, FINE = 1e-3, 1e-6  # relative change of the sum of squares at which a search ends, on the way and at last
 SHORTEST = 1e-10  # step of y, relative
 MOST = 30  # motions of one horizon
+WORK, WORK_OF_TICK = 2 * 10**5, 10  # budget of a motion, some seconds, and more for each of its control periods
 FLOOR = 1e-9  # of the spread of a channel, or of others of its kind where it stands still: the least noise
 
 
@@ -94,14 +95,18 @@ def search(problem: FitProblem) -> Array:
     for growth in GROWTHS:
         y = begin
         for rows in _horizons(len(problem.data.t), growth):
-            y = refine(problem, y, rows, ROUGH)
+            before, y = y, refine(problem, y, rows, ROUGH)
+            if y is before:  # nor does it get farther
+                break
         size = mean_square(problem, y)
         if size < least:
             best, least = y, size
         if least <= GOOD:
             break
     if not math.isfinite(least):
-        raise Refused(f"{problem.data.name}: no motion of {problem.scene.name} gets to its end; allowed: another start")
+        start = ", ".join(f"{key} {value:g}" for key, value in problem.values(begin).items())
+        raise Refused(f"{problem.data.name}: {start}: no motion of {problem.scene.name} gets from there to its end;"
+                      " allowed: another start")
     return best
 
 
@@ -119,9 +124,9 @@ def mean_square(problem: FitProblem, y: Array) -> float:
 
 
 def refine(problem: FitProblem, begin: Array, rows: int, enough: float = FINE) -> Array:
-    """The next minimum of the sum of squares over the first rows, from y = begin (n,); `begin` if no motion gets there.
+    """The next minimum of the sum of squares over the first rows, from y = begin (n,).
 
-    It ends where the sum changes by no more than `enough`, relative.
+    It is `begin` itself if no motion gets there. It ends where the sum changes by no more than `enough`, relative.
     """
     from scipy.optimize import least_squares
 
@@ -184,7 +189,7 @@ def motion(data: Measured, scene: Scene, keys: Sequence[str], rows: int) -> tupl
     """
     times, recorded = data.t[:rows], data.inputs is not None
     scene = _plant(scene) if recorded else _until(scene, times)
-    integrator = Integrator(scene.system, continuous=not data.sampled)
+    integrator = Integrator(scene.system, continuous=not data.sampled, max_work=WORK + WORK_OF_TICK * scene.ticks)
     carrier = carry(scene, integrator, directions(scene, keys, data.sampled), times, data.sampled)
     if data.inputs is None:
         states = complete(scene, integrator, data.sampled, times)

@@ -99,18 +99,20 @@ def search(problem: DesignProblem, seed: int = 0, progress: Told | None = None) 
     """Find the choice whose first outcome is smallest within the bounds.
 
     Where the best choice is unique every seed ends there. `progress` is told the number of simulations so far. Refused:
-    no choice was found that keeps the bounds and has the outcome, or scipy is not installed.
+    no choice was found that keeps the bounds and has the outcome, all have the same one, or scipy is not installed.
     """
     with needing("`grasp design`", "design"):
         from scipy.optimize import differential_evolution
-    runs, seed = 0, whole("seed", seed, 0)
+    runs, seed, worst = 0, whole("seed", seed, 0), -np.inf
 
     def function(parts: Array) -> Array:
-        nonlocal runs
+        nonlocal runs, worst
         runs += parts.shape[1]
         if progress is not None:
             progress(runs)
-        return costs(problem, np.ascontiguousarray(parts.T))
+        reached = costs(problem, np.ascontiguousarray(parts.T))
+        worst = max(worst, float(reached.max()))
+        return reached
 
     agreed = 0  # generations in a row
 
@@ -133,6 +135,9 @@ def search(problem: DesignProblem, seed: int = 0, progress: Told | None = None) 
         stops = problem.found(problem.numbers(place[None])).stops
         raise Refused(f"{problem.scene.name}: none of {runs} choices has a finite {problem.minimise[0]}"
                       + (f" with {wish}" if wish else "") + (f"; {stops[0]}" if stops else problem.why_unsettled()))
+    if worst - least <= AGREE * abs(least):
+        raise Refused(f"{problem.scene.name}: nothing to choose: {problem.minimise[0]} is {least:.10g} for all of"
+                      f" {runs} choices; allowed: numbers and ranges that change it")
     best = problem.numbers(place[None])
     outcomes = {name: float(values[0]) for name, values in problem.found(best).outcomes.items()}
     numbers = {key: float(values[0]) for key, values in best.items()}

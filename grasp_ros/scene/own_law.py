@@ -71,5 +71,5 @@ def begin(law: Law | type, what: str) -> Law:
     try:
         asked(begun)
     except TypeError as error:
-        raise Refused(f"{what}: {begun!r}: {error}; allowed: {CALLABLE}") from None
+        raise Refused(f"{what}: {error}; allowed: {CALLABLE}") from None
     return begun  # type: ignore[no-any-return]

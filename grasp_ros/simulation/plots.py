@@ -18,7 +18,7 @@ from grasp_ros.physics.energy import PLANT_ALONE
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import ascending, instance, names, number, rows
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
-from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.physics.system import BODIES, COLUMN, NAMES
 from grasp_ros.scene.files import format_of, replacing
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Axes, Figure
@@ -29,7 +29,6 @@ from grasp_ros.simulation.trajectory import Trajectory
 LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR = "#0072b2", "#333333", "#d55e00"  # distinguishable for colour-blind readers
 COLORS: dict[int, str] = {LEFT: LEFT_COLOR, OBJECT: OBJECT_COLOR, RIGHT: RIGHT_COLOR}
 V_COLOR = "#cc79a7"
-SIDES = ((LEFT, "l", LEFT_COLOR), (RIGHT, "r", RIGHT_COLOR))
 LONGEST_TITLE = 200  # characters
 WIDTH_MM = 230.0  # of a figure with one motion
 NARROWEST_MM, WIDEST_MM = 60.0, 1000.0
@@ -45,6 +44,7 @@ class Panel(NamedTuple):
     draw: Callable[[Axes, Motion], None]
     label: str  # of the axis
     share: int  # of the height
+    shown: Callable[[Motion], object] = bool  # falsy where there is nothing to draw
 
 
 def draw(
@@ -79,7 +79,7 @@ def compose(
     motions: Sequence[Motion], captions: str | Sequence[str] | None = None, *, width_mm: float | None = None,
     span: tuple[float, float] | None = None, panels: Sequence[Panel] | None = None,
 ) -> Figure:
-    """The figure that `draw` writes; its panels are by default all of PANELS."""
+    """The figure that `draw` writes; its panels are by default those of PANELS that are not empty."""
     span = shown(motions, span)
     for motion in motions:
         if not len(instance("motion", motion, Tabular, A_MOTION).t) or motion.t[0] == motion.t[-1]:
@@ -93,7 +93,9 @@ def compose(
     if width_mm is not None and not NARROWEST_MM <= width <= WIDEST_MM:
         raise Refused(f"width_mm: {width!r} is not allowed; allowed: {NARROWEST_MM:g} to {WIDEST_MM:g} mm")
     small = width / len(motions) < ONE_COLUMN_MM
-    panels = [*PANELS.values()] if panels is None else panels
+    panels = [panel for panel in panels or PANELS.values() if any(map(panel.shown, motions))]
+    if not panels:
+        raise Refused("nothing to draw: no force acts in these panels")
     shares = [panel.share for panel in panels]
     height = (0.6 if small else 0.9) * WIDTH_MM * max(sum(shares), LEAST_SHARE) / SHARE
     with canvas.style({"font.size": SMALL_LETTERS if small else LETTERS}):
@@ -150,35 +152,38 @@ def legend_beside(*row: Axes) -> None:
 
 
 def displacements(axes: Axes, motion: Motion) -> None:
-    """x_l, x_o, x_r."""
-    for body, column in COLUMN.items():
-        x = motion.state[:, column]
-        if not np.isnan(x).all():
-            axes.plot(motion.t, x, label=f"$x_{NAMES[body][0]}$", color=COLORS[body], linewidth=1.2)
+    """Positions, by their columns of the table, as all that follow."""
+    for body in motion.scene.system.present:
+        axes.plot(motion.t, motion.state[:, COLUMN[body]], label=f"x_{NAMES[body]}", color=COLORS[body], linewidth=1.2)
+
+
+def driven(motion: Motion) -> list[int]:
+    """Bodies on which a controller or a force from outside acts."""
+    forces = np.nan_to_num(motion.inputs)  # nan: from the end on nothing acts
+    return [body for body in BODIES if forces[:, body].any() or body in motion.scene.system.laws]
 
 
 def inputs(axes: Axes, motion: Motion) -> None:
-    """f_l, f_r."""
-    for side, letter, color in SIDES:
-        if side in motion.scene.system.laws or motion.command[:, side].any():
-            axes.plot(motion.t, motion.command[:, side], label=f"$f_{letter}$", color=color, linewidth=1.0)
+    """Forces of controllers and from outside."""
+    forces = motion.inputs
+    for body in driven(motion):
+        axes.plot(motion.t, forces[:, body], label=f"input_{NAMES[body]}", color=COLORS[body], linewidth=1.0)
 
 
 def impacts(axes: Axes, motion: Motion) -> None:
-    """fw_l upwards and fw_r downwards: the force on the object."""
-    for side, letter, color in SIDES:
-        if side not in motion.scene.system.contacts:
-            continue
+    """Impact forces as they act on the object: of the left contact upwards, of the right one downwards."""
+    for side in motion.scene.system.contacts:
         sign, text = (1.0, "") if side == LEFT else (-1.0, "-")
-        axes.plot(motion.t, sign * motion.impacts[:, side], label=f"${text}fw_{letter}$", color=color, linewidth=0.9)
+        axes.plot(motion.t, sign * motion.impacts[:, side], label=f"{text}impact_{NAMES[side]}", color=COLORS[side],
+                  linewidth=0.9)
 
 
 def energies(axes: Axes, motion: Motion) -> None:
     """V_c, and the paper's V where it is another one; of the plant alone where nobody knows that of a controller."""
     level, known = motion.energy, motion.energy_of != PLANT_ALONE
-    axes.plot(motion.t, level.V_c, color="black", linewidth=1.2, label="$V_c$" if known else f"of {PLANT_ALONE}")
+    axes.plot(motion.t, level.V_c, color="black", linewidth=1.2, label="V_c" if known else f"V_c of {PLANT_ALONE}")
     if known and not np.array_equal(level.V, level.V_c, equal_nan=True):
-        axes.plot(motion.t, level.V, color=V_COLOR, linewidth=1.0, linestyle="--", label="$V$ of the paper")
+        axes.plot(motion.t, level.V, color=V_COLOR, linewidth=1.0, linestyle="--", label="V of the paper")
     if 0.0 < level.V_c.min() < 0.3 * level.V_c.max():
         axes.set_yscale("log")
     elif level.V_c.min() >= 0.0 and axes.get_yscale() == "linear":
@@ -196,11 +201,9 @@ def contact_spans(motion: Motion, side: int) -> list[tuple[float, float]]:
 
 def shade_contacts(axes: Axes, motion: Motion) -> None:
     """Shade the contacts of both sides over the whole height."""
-    for side, _, color in SIDES:
-        spans = contact_spans(motion, side)
-        axes.broken_barh(
-            spans, (0.0, 1.0), transform=axes.get_xaxis_transform(), color=color, alpha=0.13, linewidth=0, zorder=0
-        )
+    for side in (LEFT, RIGHT):
+        axes.broken_barh(contact_spans(motion, side), (0.0, 1.0), transform=axes.get_xaxis_transform(),
+                         color=COLORS[side], alpha=0.13, linewidth=0, zorder=0)
 
 
 def save(figure: Figure, path: str | os.PathLike[str], dpi: int = 150) -> None:
@@ -230,6 +233,7 @@ def html_of(run: Trajectory) -> str:
 
 
 PANELS = {
-    "displacement": Panel(displacements, "displacement, m", 3), "input": Panel(inputs, "input, N", 2),
-    "impact": Panel(impacts, "impact force, N", 2), "energy": Panel(energies, "twice the energy, J", 3),
+    "displacement": Panel(displacements, "displacement, m", 3), "input": Panel(inputs, "input, N", 2, driven),
+    "impact": Panel(impacts, "impact force, N", 2, lambda motion: motion.scene.system.contacts),
+    "energy": Panel(energies, "twice the energy, J", 3),
 }

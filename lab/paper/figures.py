@@ -87,6 +87,9 @@ def sheet(several: Sequence[Pictured]) -> Drawing:
 def _on_its_axis(draw: Callable[[Axes, Trajectory], None], axes: Axes, run: Trajectory) -> None:
     """Draw a panel, displacements and inputs on the paper's axis, which is widened where a motion leaves it."""
     draw(axes, run)
+    for line in axes.lines:  # in the paper's letters
+        name = str(line.get_label()).replace("input", "f").replace("impact", "fw")
+        line.set_label(re.sub(r"(-?\w+)_(\w)\w*", r"$\1_\2$", name))
     found = {plots.displacements: (PAPER_DISPLACEMENT, run.state[:, 0::2]), plots.inputs: (PAPER_INPUT, run.command)}
     if draw not in found:
         return
@@ -119,12 +122,12 @@ def large(each: Pictured) -> Drawing:
     halves: Any = figure.subfigures(1, 2, width_ratios=(3.1, 1.0))
     wide, narrow = halves
     left = wide.subplots(5, 1, sharex=True, height_ratios=(3, 2, 2, 2, 2))
-    for axes, (panel, label, _) in zip(left, plots.PANELS.values(), strict=False):
-        draw = partial(_on_its_axis, panel)
+    for axes, panel in zip(left, plots.PANELS.values(), strict=False):
+        draw = partial(_on_its_axis, panel.draw)
         if each.beside is not None:
             _behind(axes, draw, each.beside)
         draw(axes, each.run)
-        axes.set_ylabel(label)
+        axes.set_ylabel(panel.label)
     _losses(left[4], each.run)
     for run in filter(None, (each.run, each.beside)):
         settled, own = float(settling_times(run).max()), run is each.run
@@ -202,7 +205,7 @@ def _one_contact(panels: Sequence[Axes], run: Trajectory) -> None:
     grid = np.linspace(max(span[0] - margin, 0.0), min(span[1] + margin, run.scene.duration), CONTACT_POINTS)
     fine = simulate(run.scene, grid=grid)
     force, depth = fine.impacts, fine.state[:, [0, 2]] - fine.state[:, [2, 4]]
-    for side, _, color in plots.SIDES:
+    for side, color in enumerate((LEFT_COLOR, RIGHT_COLOR)):
         style = "-" if side == 0 else "--"  # of a symmetric case both are seen
         panels[0].plot((fine.t - span[0]) * 1e3, force[:, side], color=color, linestyle=style)
         pressed = depth[:, side] > 0.0

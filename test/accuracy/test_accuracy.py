@@ -18,8 +18,9 @@ from grasp_ros.accuracy.compare import QUICK, advise, compare, fastest
 from grasp_ros.accuracy.contender import Answer, Contender, own_contenders
 from grasp_ros.accuracy.measure import NOT_INSTALLED, attempt
 from grasp_ros.accuracy.truth import Truth, finest
-from grasp_ros.cli.accuracy import _not_here
+from grasp_ros.cli.accuracy import _not_here, _table
 from grasp_ros.physics.errors import Refused
+from grasp_ros.simulation import simulate
 
 LAST = [-0.008512122262300985, -0.011087931065097529, -0.005641499599319586, 0.0034325068122038564,
         -0.0008363089547169395, 0.0033174261285577183]  # case 1 at 20 s, from the reference with 25 digits
@@ -118,6 +119,20 @@ def test_advice_within_a_budget_is_the_most_accurate() -> None:
 def test_advice_needs_one_positive_wish(wish: dict[str, float]) -> None:
     with pytest.raises(Refused, match=r"^(error|budget).* allowed: (exactly one of them|a number > 0)"):
         advise([record("a", 1.0, 1.0)], **wish)
+
+
+def test_too_many_touches_are_not_called_missed_and_no_row_is_done_without_a_result() -> None:
+    truth = Truth(np.zeros(1), np.zeros((1, 6)), (1, 1), 1e-14)
+    [_, _, more, only] = _table(truth, [record("more", 1e-3, 1.0, found=(9, 9)), record("more", 1e-6, 2.0),
+                                        record("only", 1e-3, 1.0, found=(0, 0))])
+    assert more.endswith("; 1 of 2 runs stop or count touches wrongly")
+    assert only.endswith("-  no usable run; 1 of 1 runs stop or count touches wrongly")
+
+
+def test_a_coarser_accuracy_may_take_more_work() -> None:
+    """As docs/accuracy.md says."""
+    coarse, fine = (simulate(scenes.load("friction"), setting=setting).work for setting in (1e-3, 1e-16))
+    assert coarse.sum() > fine.sum()
 
 
 def test_methods_that_do_not_know_a_scene_are_named() -> None:

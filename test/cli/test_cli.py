@@ -53,6 +53,7 @@ def end(tick, time, x, v): sys.exit()
 def close(tick, time, x, v): raise GeneratorExit
 def write(tick, time, x, v): raise BrokenPipeError
 def fill(tick, time, x, v): raise OSError(28, "No space left")
+def divide(tick, time, x, v): return 1 / tick
 class Fails:
     def __init__(self): raise ValueError("words")
 class Ends:
@@ -67,8 +68,8 @@ again = Ends()
     [
         ("broken_laws:end", "left controller broken_laws:end: SystemExit, .*line 3, tick 0"),
         ("broken_laws:close", "left controller broken_laws:close: GeneratorExit, .*line 4, tick 0"),
-        ("broken_laws:Fails", "Fails'> does not begin: ValueError: words, .*line 8"),
-        ("broken_laws:again", "does not begin: SystemExit, .*line 10"),
+        ("broken_laws:Fails", "Fails'> does not begin: ValueError: words, .*line 9"),
+        ("broken_laws:again", "does not begin: SystemExit, .*line 11"),
         ("divides_by_0:law", "divides_by_0 cannot be imported: ZeroDivisionError: division by zero, .*line 1"),
         ("ends_at_once:law", "ends_at_once cannot be imported: SystemExit: 0, .*line 1"),
         ("./broken_laws:end", "left=./broken_laws:end is not allowed; allowed: module:object"),
@@ -84,12 +85,18 @@ def test_a_controller_that_ends_or_does_not_begin_is_refused(
     assert not (tmp_path / "o.npz").exists()
 
 
-@pytest.mark.parametrize("law", ["write", "fill"])
-def test_what_a_controller_raises_is_no_error_of_the_output(law: str, command: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("law", "raised", "line"), [
+    ("write", "BrokenPipeError", 5), ("fill", "OSError: [Errno 28] No space left", 6),
+    ("divide", "ZeroDivisionError: division by zero", 7)])
+def test_what_a_controller_raises_is_one_line(
+    law: str, raised: str, line: int, command: Any, tmp_path: Path
+) -> None:
+    """Once a traceback."""
     _write_modules(tmp_path)
-    with pytest.raises(OSError, match="laws:") as raised:
-        command("simulate", "arm_alone", "--controller", f"left=broken_laws:{law}", "-o", "o.npz")
-    assert raised.value.__notes__ == [f"left controller broken_laws:{law}, tick 0, t = 0.0 s"]
+    result = command("simulate", "arm_alone", "--controller", f"left=broken_laws:{law}", "-o", "o.npz")
+    assert result.returncode == 1
+    words = re.escape(f"left controller broken_laws:{law}, tick 0, t = 0.0 s: {raised}, ")
+    assert re.fullmatch(rf"grasp: {words}.*broken_laws\.py, line {line}\n", result.stderr)
     assert not (tmp_path / "o.npz").exists()
 
 

@@ -13,6 +13,7 @@ import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.cli.main import main
+from grasp_ros.physics.observation import CALLABLE
 from lab.__main__ import with_packages
 
 LONG = "a" * 5000
@@ -51,7 +52,8 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("simulate case_01 --grid 1", "argument --grid: 1 is not allowed; allowed: a whole number >= 2"),
         ("simulate case_01 --max-work 1e3", "argument --max-work: 1e3 is not allowed; allowed: a whole number >= 1"),
         ("simulate case_01 --controller laws:soft", "laws:soft is not allowed; allowed: side=module:object"),
-        ("run case_01 --controller left=grasp_ros.cli.main:main", "too many positional arguments; allowed: "),
+        *((f"{program} case_01 --controller left=grasp_ros.cli.main:main",
+           f"too many positional arguments; allowed: {CALLABLE}") for program in ("run", "simulate")),
         ("run case_01 --controller left=math:sin --controller left=math:cos", "allowed: one for the left side"),
         ("simulate case_01 --controller up=laws:soft", "allowed: side=module:object, with the side left or right"),
         ("simulate case_01 --controller left=nowhere:soft", "left=nowhere:soft: no module nowhere; allowed: one of"),

@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from argparse import Namespace
 from dataclasses import replace
 from functools import partial
@@ -66,6 +67,19 @@ def test_interrupted_run_ends_cleanly(grasp_run: Any, tmp_path: Path, number: si
         full = simulate(scene.load("case_01"), sampled=True)
         assert full.state[:ticks].tobytes() == recording.state.tobytes()
     assert not children(tmp_path)
+
+
+def test_an_interrupted_check_says_where_the_bag_is(grasp_run: Any, tmp_path: Path) -> None:
+    """It once said nothing of it."""
+    process, whole = grasp_run("case_01", "--one-process"), tmp_path / "run" / "bag" / "metadata.yaml"
+    wait_for(lambda: whole.exists() and not children(tmp_path), "the end of the run")
+    time.sleep(0.3)  # of two seconds for reading, check and figure
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=DEADLINE)
+    assert process.returncode == 130
+    assert err.splitlines()[-1] == ("grasp: interrupted; run/bag was not checked to the end and not drawn;"
+                                    " `grasp verify` and `grasp plot` do that")
+    assert len(bag.read(tmp_path / "run" / "bag").tick) == 20001
 
 
 @pytest.mark.parametrize("numbers", [

@@ -173,6 +173,18 @@ def test_a_damaged_map_is_refused(tmp_path: Path) -> None:
     read(path)
 
 
+@pytest.mark.slow
+def test_a_damaged_chunk_among_many_is_one_line(tmp_path: Path, tiny_chunks: None) -> None:
+    """Tasks of asyncio that were left over complained, too."""
+    run(Plan(scenes.load("case_01", [SHORT]), Setup(("touches",)), (Axis(GAIN, 1.0, 9.0, 100),)), tmp_path / "m.zarr")
+    (tmp_path / "m.zarr" / "touches_left" / "c" / "3").write_bytes(b"garbage")
+    words = ("map", "case_01", "--set", SHORT, "--x", f"{GAIN}=1:9:100", "--outcome", "touches", "-q", "-o", "m.zarr")
+    found = subprocess.run([sys.executable, "-m", "grasp_ros.cli", *words], cwd=tmp_path, capture_output=True,
+                           text=True, timeout=DEADLINE_S, check=False)
+    assert found.returncode == 2
+    assert re.fullmatch(r"grasp: m.zarr/touches_left: not a whole column; .* decompression error.*\n", found.stderr)
+
+
 def test_what_is_something_else_is_left_alone(tmp_path: Path) -> None:
     plan = small_plan()
     run(plan, tmp_path / "map.zarr")

@@ -84,6 +84,7 @@ def test_no_choice_along_two_outcomes_is_better_in_both(monkeypatch: pytest.Monk
     ({BOTH_KV: (1.0, 2.0)}, "extremes", {}, "has several units; allowed: one of x_left_min"),
     ({BOTH_KV: (1.0, 2.0)}, "settling_time", {"beauty": 1.0}, "outcome beauty: not known"),
     ({BOTH_KV: (1.0, 2.0)}, "settling_time", {"peak_input": 1e-3}, "none of .* with peak_input <= 0.001"),
+    ({"right_contact.dissipation_s_per_m": (0.1, 0.2)}, "peak_input_left", {}, r"nothing to choose: .* 1\.5 for all"),
     ({}, "settling_time", {}, "axes: none"),
     ({BOTH_KV: (2.0, 1.0)}, "settling_time", {}, "2.0 to 1.0 is not .* allowed: low < high"),
     ({BOTH_KV: ("1", 2.0)}, "settling_time", {}, "low: '1' is not allowed; allowed: a number"),

@@ -49,6 +49,22 @@ def test_some_panels_make_a_lower_figure_in_their_order() -> None:
     assert two.bbox.height < 0.7 * whole.bbox.height
 
 
+def test_a_figure_shows_what_the_table_says() -> None:
+    """The input was once the command of the controller, without what acts from outside; arms alone had no impacts."""
+    run = simulate(scenes.load("table"))
+    lines = {line.get_label(): line.get_ydata() for axes in compose([run]).axes for line in axes.lines}
+    assert [*lines] == ["x_left", "x_object", "input_left", "impact_left", "V_c"]
+    table = run.dataframe()
+    assert all(np.array_equal(y, table[name], equal_nan=True) for name, y in lines.items())
+    sine = compose([simulate(scenes.load("sine"))], panels=[plots.PANELS["input"]])
+    assert [line.get_label() for line in sine.axes[0].lines] == ["input_left", "input_object", "input_right"]
+    alone = simulate(scenes.load("arm_alone"))
+    heads = [axes.get_ylabel() for axes in compose([alone]).axes]
+    assert heads == ["displacement, m", "input, N", "twice the energy, J"]
+    with pytest.raises(Refused, match=r"^nothing to draw: no force acts in these panels"):
+        compose([alone], panels=[plots.PANELS["impact"]])
+
+
 def test_contacts_of_a_recording_are_those_of_the_events() -> None:
     run = simulate(scenes.load("case_03"), grid=np.linspace(0.0, 20.0, 20001))
 
