@@ -16,7 +16,8 @@ from grasp_ros.simulation.smooth import Pieces, States, expand, real_roots
 
 Function = Callable[[Array, Array], Array]  # t (n,), state (n, 6) to (n,)
 APART = 1e-9  # of a piece: roots that are closer are one
-SECANT = 1e-6  # of a piece: over it the slope at a root is taken
+NEAR = 1e-6  # of a piece: most roots of polynomials are nearer to the function's
+MOST = 100  # iterations for a root
 
 
 class Section(NamedTuple):
@@ -59,7 +60,9 @@ def crossings(function: Function, direction: int, breaks: Array, states: States)
     signs = _carried(np.sign(_checked(function, middles, states(middles))))
     turn = np.where(signs[:-1] != 0, np.sign(np.diff(signs)), 0)
     kept = (turn != 0) & ((turn == direction) | (direction == 0))
-    t = _polished(function, states, t[kept], reach[kept])
+    t = t[kept]
+    if len(t):
+        t = _polished(function, states, t, NEAR * reach[kept], middles[:-1][kept], middles[1:][kept], signs[:-1][kept])
     lost = pieces.length[~pieces.resolved]
     return Section(t, states(t), turn[kept], float(lost.max(initial=0.0)))
 
@@ -98,15 +101,30 @@ def _candidates(pieces: Pieces) -> tuple[Array, Array]:
     return t[apart], wide[apart]
 
 
-def _polished(function: Function, states: States, t: Array, reach: Array) -> Array:
-    """One secant step for each root, on the dense output itself; where it does not help, the root stays."""
-    if not len(t):
-        return t
-    span = SECANT * reach
-    sides = np.stack([np.maximum(t - span, 0.0), t], axis=1)
-    values = function(sides.ravel(), states(sides.ravel())).reshape(-1, 2)
-    slope = (values[:, 1] - values[:, 0]) / np.maximum(sides[:, 1] - sides[:, 0], np.finfo(float).tiny)
-    step = np.divide(values[:, 1], slope, out=np.zeros_like(t), where=slope != 0.0)
-    better = np.clip(t - np.clip(step, -span, span), 0.0, None)
-    good = np.abs(function(better, states(better))) < np.abs(values[:, 1])
-    return np.where(good, better, t)
+def _polished(function: Function, states: States, t: Array, span: Array, low: Array, high: Array, before: Array
+              ) -> Array:
+    """Roots (n,) on the dense output itself, within `span` of t or farther off, by the Illinois method with bisections.
+
+    Between `low` and `high` the sign of the function changes from `before`.
+    """
+    x = np.stack([low, np.maximum(t - span, low), np.minimum(t + span, high), high], axis=1)
+    f = function(x.ravel(), states(x.ravel())).reshape(x.shape)
+    begin = np.argmax(np.sign(f[:, 1:]) != before[:, None], axis=1)  # of the first interval at whose end it is another
+    rows = np.arange(len(t))
+    low, high, at_low, at_high = x[rows, begin], x[rows, begin + 1], f[rows, begin], f[rows, begin + 1]
+    done, stayed = np.zeros(len(t), dtype=bool), np.zeros(len(t))  # end of the interval that stayed last: -1, 1
+    for k in range(MOST):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            middle = high - at_high * (high - low) / (at_high - at_low)
+        middle = np.where((low < middle) & (middle < high) & (k % 4 != 3), middle, 0.5 * (low + high))
+        value = function(middle, states(middle))
+        done |= (np.abs(middle - t) <= 2.0 * EPS * middle) | (high - low <= 4.0 * EPS * high)
+        t = np.where(done, t, middle)
+        done |= value == 0.0
+        if done.all():
+            break
+        left = np.sign(value) == before
+        at_low, at_high = (np.where(left, value, np.where(stayed == -1, 0.5 * at_low, at_low)),
+                           np.where(left, np.where(stayed == 1, 0.5 * at_high, at_high), value))
+        low, high, stayed = np.where(left, middle, low), np.where(left, high, middle), np.where(left, 1.0, -1.0)
+    return t

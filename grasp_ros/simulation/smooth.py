@@ -20,7 +20,7 @@ from grasp_ros.physics.layout import EPS
 from grasp_ros.physics.model import Array
 
 NODES = 24
-RESOLVED = 1e-12  # last coefficients of a piece, relative to the largest value of its group
+RESOLVED = 1e-13  # last coefficients of a piece, of the largest value of its group: what follows them may be larger
 LAST = 3  # coefficients that must be small
 ROUNDINGS, TINY = 4.0 * EPS, np.finfo(float).tiny  # of a time; what no two times are nearer than
 HALVINGS = 12  # of a piece; what is not resolved then is no smooth function, or rounding

@@ -214,11 +214,12 @@ class Trajectory(Tabular, Frozen):
         """Where a function of the motion crosses a level: times, states and directions.
 
         Between its events a motion is smooth. There the function is replaced by polynomials that follow it to 1e-12 of
-        its largest value, and all roots of these are found; each is a crossing if the function has other signs on both
-        sides of it. So no crossing is missed but where the function comes beyond the level by less than that. Where the
-        function, or the motion at a reversal under dry friction, is not smooth by itself, it is followed in ever
-        smaller pieces; `Section.resolution` is the length of the longest that is left, within which crossings may be
-        missed in pairs: 0 for a linear function of a motion without friction.
+        its largest value in the run, and all roots of these are found. Each is a crossing if the function has other
+        signs on both sides of it, and its time is then that of the function itself, to rounding. So no crossing is
+        missed but where the function comes beyond the level by less than that. Where the function, or the motion at a
+        reversal under dry friction, is not smooth by itself, it is followed in ever smaller pieces;
+        `Section.resolution` is the length of the longest that is left, within which crossings may be missed in pairs: 0
+        for a linear function of a motion without friction.
 
         Parameters
         ----------

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from documents import case_of
+from documents import case_of, scene_of
 
 from grasp_ros import scene
 from grasp_ros.physics.errors import Refused
@@ -55,6 +55,27 @@ def test_any_function_of_time_and_state() -> None:
     assert len(found.t) == len(seen) > 10
     assert np.abs(found.t - seen).max() <= 5.0 / 400_000
     assert found.resolution == 0.0
+
+
+def test_swings_of_a_motion_that_has_died_down_are_crossings_down_to_what_is_promised() -> None:
+    """A damped arm by itself: v = 0 every half period, with swings of 2e-12 of the largest speed at last."""
+    case = scene_of("arm_alone", "left_arm.position_m=0.3", "left_arm.stiffness_N_per_m=100", "time.duration_s=60",
+                    "left_arm.damping_Ns_per_m=1", without=("left_feedback",))
+    mass = case.values["left_arm"]["mass_kg"]
+    rate = np.sqrt(100.0 / mass - (0.5 / mass) ** 2)
+    zeros = np.arange(1, 60.0 * rate / np.pi) * np.pi / rate
+    zeros = zeros[np.exp(-0.5 / mass * zeros) > 2e-12]
+    found = simulate(case).section([0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    assert len(zeros) > 100
+    assert found.t[: len(zeros)] == pytest.approx(zeros, abs=1e-9)
+
+
+def test_a_crossing_is_found_on_the_motion_itself_whatever_the_range_of_the_function() -> None:
+    run = simulate(case_of(duration=3.0))
+    assert run.section(lambda t, _: np.exp(100.0 * (t - 1.0)), 1.0).t == pytest.approx([1.0], abs=1e-15)
+    jumps = run.section(lambda _, y: np.sign(y[:, 0] + 0.1))
+    assert jumps.t == pytest.approx(run.section([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], -0.1).t, abs=1e-15)
+    assert len(jumps.t) > 5
 
 
 def test_a_function_with_a_kink_says_how_far_it_is_resolved() -> None:
