@@ -13,6 +13,7 @@ import argparse
 import errno
 import io
 import os
+import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -22,7 +23,7 @@ from importlib import import_module
 from grasp_ros.cli.commands import COMMANDS, overview
 from grasp_ros.cli.parser import Command, Parser, add_levels, shortened
 from grasp_ros.graph.bag.disk import FULL
-from grasp_ros.graph.stopping import raise_on_signals, stop_if_signalled
+from grasp_ros.graph.stopping import on_signals, raise_on_signals, stop_if_signalled
 from grasp_ros.physics.errors import Refused, described
 
 HELP = f"""\
@@ -35,8 +36,15 @@ Begin with `grasp simulate case_01`.
 """
 
 
+def grasp() -> int:
+    """Entry point of `grasp`; returns the exit status, which a signal does not change when the work is done."""
+    status = main()
+    on_signals(signal.SIG_IGN)
+    return status
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of `grasp`; returns the exit status."""
+    """Run what the command line, or the arguments, say; returns the exit status."""
     if "_ARGCOMPLETE" in os.environ:
         complete(_parser)
     words = sys.argv[1:] if arguments is None else arguments

@@ -135,6 +135,14 @@ def test_an_interrupt_within_exec_is_an_exit_status_too(tmp_path: Path) -> None:
     assert (result.returncode, result.stderr) == (130, "grasp: interrupted\n")
 
 
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_behind_the_end_of_the_work_changes_nothing(number: str) -> None:
+    code = (f"import atexit, os, signal, sys; atexit.register(lambda: os.kill(os.getpid(), signal.{number}));"
+            " sys.argv = ['grasp', 'scenes']; from grasp_ros.cli.main import grasp; sys.exit(grasp())")
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
+    assert (result.returncode, result.stderr) == (0, "")
+
+
 def test_simulate_with_another_method_says_what_it_did(command: Any, tmp_path: Path) -> None:
     result = command("simulate", "case_01", "--method", "paper", "--step", "1e-3", "-o", "out.npz")
     assert result.returncode == 0, result.stderr
