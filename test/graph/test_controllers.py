@@ -31,11 +31,12 @@ PAGE = Path(__file__).parents[2] / "docs" / "tutorials" / "controller.md"
 def test_a_controller_that_we_did_not_write_is_recorded_and_verified(
     launch: Any, grasp_run: Any, tmp_path: Path
 ) -> None:
-    """The one that the page prints on the left, and on the right one with a frame_id that reads like a number."""
+    """The one that the page prints on the left; on the right one with a frame_id like a number, and with a torque."""
     source = titled(PAGE, "my_controller.py")
     assert len(source.splitlines()) == 19
     other = source.replace("left", "right").replace("my_controller", "another").replace(
-        "    commands.publish", '    command.header.frame_id = "7" if i else "world"\n    commands.publish')
+        "    commands.publish", '    command.header.frame_id = "7" if i else "world"\n'
+        "    command.wrench.torque.x = 3.0\n    commands.publish")
     without = ("--without", "left_controller", "--without", "right_controller")
     run = grasp_run("case_01", "--set", "time.duration_s=0.6", "--no-figure", *without)
     for text in (source, other):

@@ -12,6 +12,7 @@ import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
+from grasp_ros.graph.bag.summary import summary
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
@@ -46,6 +47,16 @@ def test_inspect_says_size_duration_and_rates_in_numbers(recorded: tuple[Path, T
     shown = command("inspect", str(path)).stdout
     assert f"\nsize                     {found['size_bytes'] / 1e6:.3g} MB\n" in shown
     assert "501 at 1000 Hz: /clock, joint_states, left/effort_command, " in shown
+
+
+def test_contacts_at_the_begin_count_again_after_a_reset(tmp_path: Path) -> None:
+    case = scenes.load("preload", ["time.duration_s=0.05", "left_arm.position_m=0.001"])
+    recorder.write(tmp_path / "bag", simulate(case, sampled=True))
+    once = bag.read(tmp_path / "bag")
+    twice = replace(once, starts=np.array([0, 51]), tick=np.arange(2 * len(once.tick)), **{
+        name: np.tile(getattr(once, name), (2, 1)) for name in ("state", "command", "effort", "lyapunov")})
+    assert len(once.tick) == 51
+    assert [summary(each)["contacts"] for each in (once, twice)] == [{"left": n, "right": 0} for n in (1, 2)]
 
 
 def test_limits_of_a_free_run_are_none_of_lockstep(recorded: tuple[Path, Trajectory], command: Any) -> None:

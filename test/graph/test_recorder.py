@@ -39,7 +39,7 @@ from grasp_ros.graph.bag.recover import recover
 from grasp_ros.graph.bag.rosbag2 import INFORMATION, decode
 from grasp_ros.graph.bag.storage import DATA_END_BYTES, SUM, Stored
 from grasp_ros.graph.serialization import force_template, lyapunov_template, state_template
-from grasp_ros.scene.topics import CONTACTS, DIAGNOSTICS, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES
+from grasp_ros.scene.topics import COMMANDS, CONTACTS, DIAGNOSTICS, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES
 from grasp_ros.simulation import Trajectory, simulate
 from lab.drills import recorder as study
 
@@ -229,6 +229,8 @@ def test_numbers_of_another_make_go_by_their_names_and_stand_alone(run: Trajecto
     pushed.wrench.force.y = 3.0
     with pytest.raises(bag.BagError, match=r"contact/left: a force or torque beside force\.x; allowed: 0"):
         Columns("contact/left", CONTACTS["left"], run.scene).numbers(store.serialize_cdr(pushed, CONTACTS["left"].type))
+    command = Columns("left/effort_command", COMMANDS["left"], run.scene)  # of a stranger, who may send what he likes
+    assert command.numbers(store.serialize_cdr(pushed, COMMANDS["left"].type)) == [0, 0, 2.0]
 
 
 def test_stamps_are_whole_numbers_after_104_days() -> None:

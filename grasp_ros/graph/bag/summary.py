@@ -50,16 +50,18 @@ def _levels(recording: Recording) -> dict[str, Any]:
     named = dict(zip(LYAPUNOV_NAMES, recording.lyapunov.T, strict=True))
     level = recording.energy
     return {
-        "contacts": {"left": _beginnings(named["mode"], Mode.LEFT), "right": _beginnings(named["mode"], Mode.RIGHT)},
+        "contacts": {side: _beginnings(recording, named["mode"], flag)
+                     for side, flag in (("left", Mode.LEFT), ("right", Mode.RIGHT))},
         "energy_of": recording.energy_of, "V_J": level.V[[0, -1]].tolist(),
         "V_c_J": level.V_c[[0, -1]].tolist(),
         "work_J": 0.5 * float(np.nansum(named["work"])), "alarms": recording.alarms,
     }
 
 
-def _beginnings(mode: Array, flag: Mode) -> int:
+def _beginnings(recording: Recording, mode: Array, flag: Mode) -> int:
     touching = (np.nan_to_num(mode).astype(int) & int(flag)) != 0
-    return int(np.count_nonzero(touching[1:] & ~touching[:-1]) + touching[0])
+    before = np.append(False, touching[:-1]) & ~np.isin(recording.tick, recording.starts)  # a reset begins anew
+    return int(np.count_nonzero(touching & ~before))
 
 
 def verified(verification: Verification) -> dict[str, Any]:

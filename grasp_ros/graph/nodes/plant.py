@@ -226,8 +226,9 @@ class Plant(PeerNode):
         """End: the horizon has been reached and answered."""
         self.phase, self.words = Phase.FINISHED, "finished"
         self.finished = True
-        speed = self.scene.ticks / (time.monotonic() - self._begin)
-        self.get_logger().info(f"finished {self.scene.ticks} ticks at {speed:.1f} ticks/s")
+        ticks, seconds = self.scene.ticks, time.monotonic() - self._begin
+        speed = ticks / seconds
+        self.get_logger().info(f"finished {ticks} ticks in {seconds:.1f} s: {speed:.1f} ticks/s with all pauses")
         self.heartbeats.end("")  # for the monitor, which may be in this thread
 
     def _show(self) -> None:
