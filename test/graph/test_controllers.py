@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -11,9 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import WrenchStamped
 from graphs import call
 from processes import DEADLINE, START, node_command, wait_for
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import QoSPresetProfiles
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
@@ -72,6 +75,17 @@ def test_a_second_source_of_commands_is_named_and_refused(
     assert plant.returncode == 1
     assert "left/effort_command: 2 sources, /left_controller and /rogue; allowed in lockstep: one" in errors
     assert "Traceback" not in errors
+
+
+def test_a_controller_with_another_quality_of_service_is_named_while_it_is_waited_for(
+    launch: Any, node: tuple[Any, SingleThreadedExecutor]
+) -> None:
+    peer, _ = node
+    peer.create_publisher(WrenchStamped, "left/effort_command", QoSPresetProfiles.SENSOR_DATA.value)
+    launch(*node_command("plant", scene="arm_alone"), stderr=subprocess.DEVNULL)
+    words = ("waiting for left/effort_command; not connected: peer, whose left/effort_command is"
+             " geometry_msgs/msg/WrenchStamped, best_effort; needed: geometry_msgs/msg/WrenchStamped, reliable")
+    wait_for(lambda: json.loads(call("status", node).message)["words"] == words, "the words of the plant")
 
 
 @pytest.mark.thorough

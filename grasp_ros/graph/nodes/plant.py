@@ -163,7 +163,8 @@ class Plant(PeerNode):
         monitor = [LYAPUNOV] if self.monitored else []
         missing += [] if self.linked(self._states, monitor) else [LYAPUNOV.name]
         if missing:
-            self.words = f"waiting for {', '.join(missing)}"
+            misfits = self.misfits(self.scene.controllers.values())
+            self.words = "; ".join((f"waiting for {', '.join(missing)}", *misfits))
         else:
             deaf = [topic.name for topic in self.loop.topics if not self.linked(self._states, [topic])]
             self.words = (f"waiting until whoever publishes {' and '.join(deaf) or 'a command'} listens to"

@@ -113,6 +113,13 @@ class GraspNode(ParameterNode):
         return [writer for writer in self.get_publishers_info_by_topic(topic.name) if writer.topic_type == topic.type
                 and messages.connects(writer.qos_profile, messages.reader_qos(topic))]
 
+    def misfits(self, topics: Iterable[Topic]) -> list[str]:
+        """Publishers that no reader of these topics is connected with, in words."""
+        return [f"not connected: {writer.node_name}, whose {topic.name} is {writer.topic_type},"
+                f" {writer.qos_profile.reliability.name.lower()}; needed: {topic.type}, reliable"
+                for topic in topics for writer in self.get_publishers_info_by_topic(topic.name)
+                if writer not in self.writers(topic)]
+
     def readers(self, publisher: Publisher) -> list[TopicEndpointInfo]:
         """Subscriptions that a publisher is connected with, as soon as discovery is through."""
         return [reader for reader in self.get_subscriptions_info_by_topic(publisher.topic_name)
