@@ -93,7 +93,8 @@ def compose(
     if width_mm is not None and not NARROWEST_MM <= width <= WIDEST_MM:
         raise Refused(f"width_mm: {width!r} is not allowed; allowed: {NARROWEST_MM:g} to {WIDEST_MM:g} mm")
     small = width / len(motions) < ONE_COLUMN_MM
-    panels = [panel for panel in panels or PANELS.values() if any(map(panel.shown, motions))]
+    asked = PANELS.values() if panels is None else panels
+    panels = [panel for panel in asked if any(map(panel.shown, motions))]
     if not panels:
         raise Refused("nothing to draw: no force acts in these panels")
     shares = [panel.share for panel in panels]

@@ -57,12 +57,14 @@ def crossings(function: Function, direction: int, breaks: Array, states: States)
     t, reach = _candidates(pieces)
     ends = np.concatenate([breaks[:1], t, breaks[-1:]])
     middles = 0.5 * (ends[1:] + ends[:-1])
-    signs = _carried(np.sign(_checked(function, middles, states(middles))))
+    values = _checked(function, middles, states(middles))
+    signs = _carried(np.sign(values))
     turn = np.where(signs[:-1] != 0, np.sign(np.diff(signs)), 0)
     kept = (turn != 0) & ((turn == direction) | (direction == 0))
     t = t[kept]
     if len(t):
-        t = _polished(function, states, t, NEAR * reach[kept], middles[:-1][kept], middles[1:][kept], signs[:-1][kept])
+        sides, at_sides = (np.stack([row[:-1][kept], row[1:][kept]], axis=1) for row in (middles, values))
+        t = _polished(function, states, t, NEAR * reach[kept], sides, at_sides, signs[:-1][kept])
     lost = pieces.length[~pieces.resolved]
     return Section(t, states(t), turn[kept], float(lost.max(initial=0.0)))
 
@@ -101,14 +103,16 @@ def _candidates(pieces: Pieces) -> tuple[Array, Array]:
     return t[apart], wide[apart]
 
 
-def _polished(function: Function, states: States, t: Array, span: Array, low: Array, high: Array, before: Array
-              ) -> Array:
+def _polished(
+    function: Function, states: States, t: Array, span: Array, sides: Array, at_sides: Array, before: Array,
+) -> Array:
     """Roots (n,) on the dense output itself, within `span` of t or farther off, by the Illinois method with bisections.
 
-    Between `low` and `high` the sign of the function changes from `before`.
+    Between its `sides` (n, 2), where it has the values `at_sides`, the sign of the function changes from `before`.
     """
-    x = np.stack([low, np.maximum(t - span, low), np.minimum(t + span, high), high], axis=1)
-    f = function(x.ravel(), states(x.ravel())).reshape(x.shape)
+    near = np.clip(np.stack([t - span, t + span], axis=1), sides[:, :1], sides[:, 1:])
+    at_near = function(near.ravel(), states(near.ravel())).reshape(near.shape)
+    x, f = np.insert(sides, [1], near, axis=1), np.insert(at_sides, [1], at_near, axis=1)
     begin = np.argmax(np.sign(f[:, 1:]) != before[:, None], axis=1)  # of the first interval at whose end it is another
     rows = np.arange(len(t))
     low, high, at_low, at_high = x[rows, begin], x[rows, begin + 1], f[rows, begin], f[rows, begin + 1]

@@ -45,6 +45,12 @@ class Phase(Enum):
     FAILED = "failed"
 
 
+def _fits(writer: TopicEndpointInfo, topic: Topic) -> bool:
+    """Whether a reader of a topic is connected with a publisher: by the type and the quality of service."""
+    connects = messages.connects(writer.qos_profile, messages.reader_qos(topic))
+    return bool(writer.topic_type == topic.type and connects)
+
+
 class GraspNode(ParameterNode):
     """A node with counters on /diagnostics and an end."""
 
@@ -110,15 +116,14 @@ class GraspNode(ParameterNode):
 
     def writers(self, topic: Topic) -> list[TopicEndpointInfo]:
         """Publishers that a reader of a topic is connected with; not those of another type or quality of service."""
-        return [writer for writer in self.get_publishers_info_by_topic(topic.name) if writer.topic_type == topic.type
-                and messages.connects(writer.qos_profile, messages.reader_qos(topic))]
+        return [writer for writer in self.get_publishers_info_by_topic(topic.name) if _fits(writer, topic)]
 
     def misfits(self, topics: Iterable[Topic]) -> list[str]:
         """Publishers that no reader of these topics is connected with, in words."""
         return [f"not connected: {writer.node_name}, whose {topic.name} is {writer.topic_type},"
                 f" {writer.qos_profile.reliability.name.lower()}; needed: {topic.type}, reliable"
                 for topic in topics for writer in self.get_publishers_info_by_topic(topic.name)
-                if writer not in self.writers(topic)]
+                if not _fits(writer, topic)]
 
     def readers(self, publisher: Publisher) -> list[TopicEndpointInfo]:
         """Subscriptions that a publisher is connected with, as soon as discovery is through."""
