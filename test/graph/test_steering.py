@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from graphs import call, rewritten
-from processes import DEADLINE, GRASP, START, ran, wait_for
+from processes import DEADLINE, GRASP, START, children, ran, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rosgraph_msgs.msg import Clock
@@ -126,6 +127,23 @@ def test_a_plant_that_was_stepped_to_the_end_is_put_back_or_let_finish(
     shell.communicate("resume\n", timeout=DEADLINE)
     out, err = run.communicate(timeout=DEADLINE)
     assert (run.returncode, "8002 states follow" in out) == (0, True), out + err
+
+
+def test_a_monitor_that_was_behind_has_all_commands_of_a_free_run(
+    grasp_run: Any, launch: Any, tmp_path: Path
+) -> None:
+    """It took the last hundred that waited when the plant had ended: others that had acted were not in the bag."""
+    run = grasp_run("arm_alone", "--set", "time.duration_s=0.45", "--paused", "--no-figure", "--free-running")
+    shell = launch(*GRASP, "ctl", **PIPES)
+    ask = partial(answer_of, shell)
+    wait_for(lambda: "paused at tick 0 of" in ask("status"), "the first state")
+    monitor = children(tmp_path)["monitor"]
+    os.kill(monitor, signal.SIGSTOP)
+    assert ask("step 450").startswith("arm_alone: paused at tick 450 of 450")
+    shell.communicate("resume\n", timeout=DEADLINE)
+    os.kill(monitor, signal.SIGCONT)
+    out, err = run.communicate(timeout=DEADLINE)
+    assert (run.returncode, "451 states follow" in out) == (0, True), out + err
 
 
 def test_a_bag_of_another_program_is_published_from_its_first_message_on_or_refused(

@@ -39,6 +39,7 @@ from grasp_ros.scene.topics import (
     CHANGES,
     CLOCK,
     COMMANDS,
+    DEPTH,
     DIAGNOSTICS,
     JOINT_STATES,
     LYAPUNOV,
@@ -141,9 +142,8 @@ class Monitor(PeerNode):
 
     def _begin(self) -> None:
         """Record, once it is known what runs and how."""
-        if self._scene is None or self._running is None:
+        if (scene := self._scene) is None or (running := self._running) is None:
             return
-        scene, running = self._scene, self._running
         beside = [] if running.lockstep else [TIMING, *scene.controllers.values()]
         per_tick = [topic for topic in scene.topics if topic != LYAPUNOV and topic not in beside]
         self._lyapunov, self._picture = LyapunovMonitor(scene), Picture(self, scene)
@@ -293,7 +293,7 @@ class Monitor(PeerNode):
         if self._recorder is not None:
             with suppress(*[BagError] if self.exit_code else []):  # it has been said
                 self._take_what_came()
-                self.take_waiting(self._others)  # what came with the last state
+                self.take_waiting(self._others, DEPTH)  # what came with the last states: it may have been behind
                 self._recorder.close(self.counters)
                 self.get_logger().info(f"closed the bag {self._path}: {self.counters['ticks']} ticks")
         if self.finished:

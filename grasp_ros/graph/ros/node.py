@@ -30,7 +30,7 @@ REPORT_SECONDS = 1.0
 PATIENCE_SECONDS = 5.0
 ACKNOWLEDGE_SECONDS = 5.0
 LOSSES = ("lost", "silent")  # how the counters begin that are never again as if nothing had been
-SWEEP = 100  # messages of one topic at a time
+SWEEP = 100  # messages of one topic at a time, unless a node ends
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # what discovery answers until it has the name
 NEW = "a node whose name is not known yet"
 
@@ -210,14 +210,14 @@ class GraspNode(ParameterNode):
                 return
             yield found[0]
 
-    def take_waiting(self, subscriptions: Iterable[Subscription]) -> None:
+    def take_waiting(self, subscriptions: Iterable[Subscription], most: int = SWEEP) -> None:
         """Take the messages that the executor has not been told of, in the order in which the subscriptions were made.
 
         Between looking for messages and listening for them, rmw_fastrtps is deaf for a moment: the first message of a
         topic can lie there until the second comes. The last subscription is looked at first: whoever sends a command
         when all have confirmed what he announced before finds both taken, or the announcement alone.
         """
-        taken = [(own, [*islice(self.waiting(own), SWEEP)]) for own in reversed([*subscriptions])]
+        taken = [(own, [*islice(self.waiting(own), most)]) for own in reversed([*subscriptions])]
         for subscription, came in reversed(taken):
             for message in came:
                 subscription.callback(message)
