@@ -104,10 +104,8 @@ class Integrator:
         # Kernels are compiled once: for floats, and for arrays in C order that may be written to.
         self.system, self.continuous = system, continuous
         self._max_events, self._max_work = whole("max_events", max_events, 0), whole("max_work", max_work, 0)
-        bodies = system.closed_loop if continuous else system.bodies
-        self._plant_block = _block_of(bodies, system.pairs, system.coulomb)
-        self._state_block, self.records = new_state()
-        self.records.y[:] = *state, state[X.L] - state[X.O], state[X.O] - state[X.R]
+        self._plant_block = _block_of(system, continuous)
+        self._state_block, self.records = new_state(*state, state[X.L] - state[X.O], state[X.O] - state[X.R])
         self.records.rest[SINCE] = math.inf
         self._events: list[Array] = []
         self._event_count = 0
@@ -250,11 +248,13 @@ class Integrator:
         return True
 
 
-def _block_of(bodies: Array, pairs: Array, coulomb: float) -> Array:
+def _block_of(system: System, continuous: bool) -> Array:
     """Numbers of a plant, see `plant_of`; a body that is not there has a mass, and rests at 0 without any force."""
-    given = bodies.ravel().tolist()
+    left, right, object_ = system.rows(continuous)
+    given = [*left, *right, *object_]
     given[::4] = [mass or 1.0 for mass in given[::4]]
-    return np.array([*given, *[0.0] * BODY_NUMBERS, *pairs.ravel().tolist(), coulomb, *given[3::4]])
+    left, right = system.pairs.tolist()
+    return np.array([*given, *[0.0] * BODY_NUMBERS, *left, *right, system.coulomb, *given[3::4]])
 
 
 @compiling

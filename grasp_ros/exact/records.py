@@ -58,10 +58,10 @@ def state_of(block: Array, mode: Integers) -> State:
     return State(block[:8], mode, block[8:14], block[14:17], block[17:])
 
 
-def new_state() -> tuple[Array, State]:
-    """Where a run begins: a block of numbers, and its record, with modes that are not known yet."""
-    block = np.zeros(STATE_NUMBERS)
-    return block, state_of(block, np.array([Pair.UNKNOWN.value] * 3))
+def new_state(*y: float) -> tuple[Array, State]:
+    """Where a run begins: a block of numbers, first those of `State.y`, and its record, with modes not yet known."""
+    block = np.array([*y, *[0.0] * (STATE_NUMBERS - len(y))])
+    return block, state_of(block, _UNKNOWN.copy())
 
 
 def new_run() -> tuple[Array, Array, Plant, State]:
@@ -114,6 +114,7 @@ class Loop(NamedTuple):
     waiting: Array = np.zeros((0, 3))  # (delay, 3) commands on their way, N by body: a ring; updated in place
 
 
+_UNKNOWN = np.full(3, Pair.UNKNOWN.value)
 _FIRST = np.array([-1 if entry == Place.FAILED else 0 for entry in Place])
 
 

@@ -99,11 +99,15 @@ class System:
     @property
     def closed_loop(self) -> Array:
         """`bodies` with the continuous feedback of the controllers, (4), (5), in them."""
-        bodies = self.bodies.tolist()  # of three rows lists are faster than arrays
-        for side, law in self.laws.items():
-            (mass, stiffness, damping, force), (kp, kv, set_point, feed_forward) = bodies[side], law.row[:4].tolist()
-            bodies[side] = mass, stiffness + kp, damping + kv, force + (kp * set_point + feed_forward)
-        return np.array(bodies)
+        return np.array(self.rows(True))
+
+    def rows(self, closed_loop: bool) -> list[list[float]]:
+        """`closed_loop`, or `bodies`, as lists, which of three rows are faster than arrays."""
+        bodies: list[list[float]] = self.bodies.tolist()
+        for side, law in self.laws.items() if closed_loop else ():
+            (mass, stiffness, damping, force), (kp, kv, set_point, feed_forward, *_) = bodies[side], law.row.tolist()
+            bodies[side] = [mass, stiffness + kp, damping + kv, force + (kp * set_point + feed_forward)]
+        return bodies
 
     def arm(self, side: int) -> Arm:
         """An arm with the gains of its controller."""

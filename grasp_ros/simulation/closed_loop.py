@@ -23,6 +23,7 @@ from grasp_ros.physics.given import mapping, names, plain
 from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.observation import check
+from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.own_law import begin
@@ -183,6 +184,6 @@ def solve(
         lambda integrator: drive(scene, integrator, sampled, grid, loop, changes, by_user, progress),
         None if sampled else progress,
     ))
-    if absent := scene.system.absent_columns:  # numpy takes its time for no columns, too
-        found.state[:, absent] = np.nan
+    for body in scene.system.absent:  # a slice takes a fifth of the time of a list of columns
+        found.state[:, COLUMN[body] : COLUMN[body] + 2] = np.nan
     return found, None if loop is None else LoopRecord(*(rows[: len(found.state)] for rows in loop))

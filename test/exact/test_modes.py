@@ -401,6 +401,15 @@ def test_slip(side: Body) -> None:
 
 
 @SIDES
+def test_a_slip_that_the_series_foresaw_too_early_is_none(side: Body) -> None:
+    """They have the error of the accuracy; it slipped and stuck at once, and slipped again."""
+    b = bench(side, -1.0, 0.0, coulomb=5.0, slide=Slide.STUCK, object_push=-5.0 * (1.0 - 1e-9))
+    b.plant.bodies[OBJECT, Of.MASS] = math.inf
+    make_slide_transition(b.plant, b.state, toward(side, Slide.LEFTWARD), b.out)
+    assert (b.slide, b.events, b.plant.bodies[OBJECT, Of.MASS]) == (Slide.STUCK, [], math.inf)
+
+
+@SIDES
 def test_an_object_that_turns_without_a_rest_is_no_event(side: Body) -> None:
     b = bench(side, -1.0, 0.0, coulomb=5.0, slide=toward(side, Slide.RIGHTWARD), object_speed=1e-17, object_push=-6.0)
     make_slide_transition(b.plant, b.state, Slide.STUCK, b.out)

@@ -8,7 +8,7 @@ from documents import body, made, scene_of
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Status
-from grasp_ros.physics.layout import LEFT, Transition
+from grasp_ros.physics.layout import LEFT, OBJECT, Entry, Transition
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
 
@@ -136,3 +136,20 @@ def test_an_object_pushed_by_exactly_its_friction_sticks(beside: int) -> None:
     assert simulate(scene).events == []
     more = scene.changed({"left_feedback.feed_forward_N": 1.01 * force})
     assert [event.kind for event in simulate(more).events] == [Transition.SLIP]
+
+
+def test_no_accuracy_lets_the_object_slip_twice_for_once() -> None:
+    """The force of the series and that of the state differ by the accuracy: half of such runs at 1e-5 slipped twice."""
+    rng = np.random.default_rng(7)
+    scene = scenes.load("friction", ["time.duration_s=5"])
+    numbers = {f"{section}.{key}": value for section, keys in scene.values.items() if section != "time"
+               for key, value in keys.items() if isinstance(value, float) and value}
+    slips = 0
+    for _ in range(20):
+        drawn = [f"{name}={value * 10.0 ** rng.uniform(-0.5, 0.5)!r}" for name, value in numbers.items()]
+        for accuracy in (1e-3, 1e-5, 1e-7, 1e-9, 1e-12, 1e-16):
+            table = simulate(scenes.load("friction", ["time.duration_s=5", *drawn]), setting=accuracy).event_table
+            when = table[table[:, Entry.BODY] == OBJECT, Entry.TIME]
+            slips += len(when)
+            assert len(when) < 3 or (when[2:] - when[:-2]).min() > 1e-9, (drawn, accuracy)
+    assert slips > 500
