@@ -42,8 +42,7 @@ DECAYS = 2.0  # time constants of a damper that a step may span: terms that canc
 
 # The check of a segment.
 ENERGY = 128.0  # roundings of the sum of all terms: flights, impacts and differences of positions
-NEGLECTED = 1000.0  # of it times the accuracy: a contact step may be off by some hundred first neglected terms
-BELIEVED = 0.1  # of an energy, and of a way: more is wrong with any accuracy
+NEGLECTED = 100.0  # of it, and of a way, times the accuracy: a contact step is off by some first neglected terms
 ENERGY_UNDERFLOW = 1e-300  # J; energies of a motion that died out have few digits
 DIED_OUT = 1e-150  # m; squares and products of less have left the range of numbers
 MAX_IDLE = 1000  # segments without progress in time

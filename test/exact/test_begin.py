@@ -16,7 +16,7 @@ from oracles import FREE, done, kinds, run
 from grasp_ros.exact.automaton.begin import force_free_time, leaves_force_out, must_begin
 from grasp_ros.exact.automaton.edge import HIGHEST
 from grasp_ros.exact.automaton.friction import apply_friction
-from grasp_ros.exact.automaton.modes import begin_contacts, end_begin, initial_modes
+from grasp_ros.exact.automaton.modes import initial_modes
 from grasp_ros.exact.kinematics import other
 from grasp_ros.exact.records import Array
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, Slide, Transition, U, V, Work, X
@@ -216,23 +216,6 @@ def test_a_pair_begins_where_the_regularised_time_cannot(
 ) -> None:
     b = bench(side, u, d, mode, beside=beside, beside_mode=beside_mode)
     assert must_begin(b.state, side) is expected
-    begin_contacts(b.state)
-    assert b.mode(side) is (Pair.BEGINNING if expected else mode)
-
-
-@SIDES
-@pytest.mark.parametrize(("u", "d", "mode", "expected"), [
-    (1e-30, 0.1, Pair.BEGINNING, Pair.CONTACT), (1e-30, -0.1, Pair.BEGINNING, Pair.CONTACT),
-    (0.0, 0.1, Pair.BEGINNING, Pair.CONTACT), (0.0, 0.0, Pair.BEGINNING, Pair.BEGINNING),
-    (0.0, -0.1, Pair.BEGINNING, Pair.OPEN), (-1e-30, 0.1, Pair.BEGINNING, Pair.OPEN),
-    (1e-9, 0.1, Pair.LEAVING, Pair.LEAVING), (-1e-9, 0.1, Pair.OPEN, Pair.OPEN)])
-def test_a_pair_that_has_begun_is_in_contact_or_has_come_back(side: Body, u: float, d: float, mode: Pair, expected: Pair
-                                                              ) -> None:
-    b = bench(side, u, d, mode)
-    end_begin(b.state, side, b.out)
-    assert (b.mode(side), b.mode(other(side))) == (expected, Pair.OPEN)
-    released = mode is Pair.BEGINNING and expected is Pair.OPEN
-    assert b.events == ([(side, Transition.RELEASE)] if released else [])
 
 
 @SIDES

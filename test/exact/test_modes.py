@@ -14,7 +14,9 @@ from exact.bench import TOLERANCE, Bench, bench, bits
 
 from grasp_ros.exact.automaton.friction import apply_friction, since_certain
 from grasp_ros.exact.automaton.modes import (
+    begin_contacts,
     begin_interval,
+    end_begin,
     initial_modes,
     initial_slide,
     let_leave,
@@ -22,6 +24,7 @@ from grasp_ros.exact.automaton.modes import (
     make_transition,
     make_transitions,
     mode_of,
+    settle_pairs,
     settle_resting,
 )
 from grasp_ros.exact.compensated import velocity_lane
@@ -691,3 +694,49 @@ def test_one_pair_alone_does_not_leave_without_its_force(side: Body, beside_mode
     b = bench(side, 0.1 * depth(0.3), -0.3, Pair.CONTACT, beside=(0.1 * depth(0.3), -0.3), beside_mode=beside_mode)
     let_leave(b.plant, b.state, b.settings)
     assert (b.mode(side), b.mode(other(side))) == (Pair.CONTACT, beside_mode)
+
+
+@SIDES
+def test_only_a_pair_in_contact_leaves(side: Body) -> None:
+    b = bench(side, 0.01, -2.0, Pair.CLAMPED)
+    let_leave(b.plant, b.state, b.settings)
+    assert b.mode(side) is Pair.CLAMPED
+
+
+# Pairs that begin without their force.
+
+
+@SIDES
+def test_pairs_begin_alike(side: Body) -> None:
+    """Each of two that touch at once begins because the other one does."""
+    alone, both = bench(side, 0.0, 0.0, Pair.CONTACT), bench(side, 0.0, 0.3, Pair.CONTACT, beside=(0.0, 0.1),
+                                                             beside_mode=Pair.CONTACT)
+    for b, expected in ((alone, Pair.OPEN), (both, Pair.BEGINNING)):
+        begin_contacts(b.state)
+        assert (b.mode(side), b.mode(other(side)), b.events) == (Pair.BEGINNING, expected, [])
+
+
+@SIDES
+@pytest.mark.parametrize(("u", "d", "mode", "expected"), [
+    (1e-30, 0.1, Pair.BEGINNING, Pair.CONTACT), (1e-30, -0.1, Pair.BEGINNING, Pair.CONTACT),
+    (0.0, 0.1, Pair.BEGINNING, Pair.CONTACT), (0.0, 0.0, Pair.BEGINNING, Pair.BEGINNING),
+    (0.0, -0.1, Pair.BEGINNING, Pair.OPEN), (-1e-30, 0.1, Pair.BEGINNING, Pair.OPEN),
+    (1e-9, 0.1, Pair.LEAVING, Pair.LEAVING), (-1e-9, 0.1, Pair.OPEN, Pair.OPEN)])
+def test_a_pair_that_has_begun_is_in_contact_or_has_come_back(side: Body, u: float, d: float, mode: Pair, expected: Pair
+                                                              ) -> None:
+    b = bench(side, u, d, mode)
+    end_begin(b.state, side, b.out)
+    assert (b.mode(side), b.mode(other(side))) == (expected, Pair.OPEN)
+    released = mode is Pair.BEGINNING and expected is Pair.OPEN
+    assert b.events == ([(side, Transition.RELEASE)] if released else [])
+
+
+@SIDES
+def test_a_segment_begins_with_every_rule_for_pairs(side: Body) -> None:
+    for b, expected, events in (
+        (bench(side, 0.0, 0.0, push=1.0), Pair.BEGINNING, [(side, Transition.TOUCH)]),  # pressed from rest
+        (bench(side, 1e-30, 0.1, Pair.BEGINNING), Pair.CONTACT, []),
+        (bench(side, 0.01, -2.0, Pair.CONTACT), Pair.LEAVING, []),
+    ):
+        settle_pairs(b.plant, b.state, b.settings, b.out)
+        assert (b.mode(side), b.mode(other(side)), b.events) == (expected, Pair.OPEN, events)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from documents import case_of, scene_of
+from documents import body, case_of, made, scene_of
 
 from grasp_ros import scene
 from grasp_ros.physics.errors import Refused
@@ -106,3 +106,15 @@ def test_no_contact_is_an_empty_table_and_no_side_is_refused() -> None:
         simulate(case_of()).contacts("up")
     with pytest.raises(Refused, match="rk4 does not look for contacts; allowed: a run by exact, "):
         simulate(case_of(), method="rk4").contacts("left")
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-6, 1e-9])
+def test_an_impact_is_off_by_a_few_accuracies(accuracy: float) -> None:
+    """Of two bodies that nothing else moves; it was by a hundred, and at 1e-3 it gave energy."""
+    for loss in np.logspace(-2.5, 0.5, 25).tolist():
+        hit = made(1.0, 0.01, left_arm=body(1.0, -0.001, 1.0), object=body(1.0),
+                   left_contact={"hertz_N_per_m1_5": 1e4, "dissipation_s_per_m": loss})
+        found, right = (simulate(hit, setting=own).contacts("left") for own in (accuracy, 1e-16))
+        assert len(found) == len(right) == 1
+        for column, scale in (("restitution", 1.0), ("impulse", 1.0), ("loss", 0.5)):
+            assert abs(found[column][0] - right[column][0]) < 5.0 * accuracy * scale, (loss, column)

@@ -248,14 +248,15 @@ def make_slide_transition(plant: Plant, state: State, following: Slide, out: Out
     """The reset map of the object: it slips into the mode that follows, stops, or turns without a rest; v_o = 0.
 
     The series by which it slips have the error of the accuracy. Where the force in the state at their end is still
-    below the friction, by what `slide_in_contact` would stop it for at once, it sticks on: the next step finds a slip.
+    below the friction, by half of that for which `slide_in_contact` would stop it at once, because the two differ by a
+    rounding, it sticks on: the next step finds a slip.
     """
     put(state, V.O, 0.0)
     if state.mode[OBJECT] != Slide.STUCK:
         settle_object(plant, state, out)
         return
     push = push_on_object(plant, state)
-    if abs(push.value) - plant.coulomb < -0.5 * push.rounding:
+    if abs(push.value) - plant.coulomb < -0.25 * push.rounding:
         return
     state.mode[OBJECT] = following
     apply_friction(plant, state.mode)

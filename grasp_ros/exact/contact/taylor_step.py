@@ -20,7 +20,7 @@ from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Lane, Pair
 
 TAIL = 5  # at a touch with p = 0 only every fifth coefficient differs from zero
 SMALLEST = 1e-290  # of what moves
-BELOW, ABOVE = 0.25, 4.0  # steps beyond which what moves is not what moves within a unit
+BELOW, ABOVE = 0.5, 2.0  # parts of a reach beyond which what moves in a step is not what moves within the reach
 FAR_BELOW, FAR_ABOVE = 2.0**-10, 2.0**5  # steps whose unit does not fit; a small unit lets terms underflow
 MOST = 16  # binary orders by which a unit is changed at once
 MAX_UNITS, MOST_FITS = 200, 4
@@ -145,10 +145,10 @@ def fitted_step(tables: Tables, plant: Plant, state: State, settings: Settings, 
     for turn in range(MAX_UNITS):
         begin_series(tables, state)
         expand(tables, plant, step)
-        h = 1.0
+        h = step.order.first  # where the unit is the radius of convergence
         for _ in range(2):
-            h = length(tables, pulled, step, settings, h)
-            if BELOW < h < ABOVE or not 0.0 < h < math.inf:
+            reach, h = h, length(tables, pulled, step, settings, h)
+            if BELOW * reach < h < ABOVE * reach or not 0.0 < h < math.inf:
                 break
         fits += FAR_BELOW < h < FAR_ABOVE
         if fits > 0 and (turn == 0 or fits > MOST_FITS or orders_to_one(h, MOST) == 0):

@@ -8,7 +8,7 @@ from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.kinematics import arm_of, reduced_mass
 from grasp_ros.exact.records import Array, Level, Plant, Settings, State
-from grasp_ros.exact.tolerances import BELIEVED, DIED_OUT, ENERGY, ENERGY_UNDERFLOW, MAX_IDLE, NEGLECTED
+from grasp_ros.exact.tolerances import DIED_OUT, ENERGY, ENERGY_UNDERFLOW, MAX_IDLE, NEGLECTED
 from grasp_ros.physics.body_energy import body_energy
 from grasp_ros.physics.domain import LARGEST_POSITION, LARGEST_SPEED
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Law, Of, Outcome, Pair, U, V, X
@@ -105,7 +105,7 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
         return Outcome.OUTSIDE
     if idle > MAX_IDLE:
         return Outcome.STALLED
-    part = ENERGY * EPS + min(NEGLECTED * settings.tolerance, BELIEVED)
+    part = ENERGY * EPS + NEGLECTED * settings.tolerance
     if (penetrates(plant, state, LEFT, before.u_l, size, t, part)
             or penetrates(plant, state, RIGHT, before.u_r, size, t, part)):
         return Outcome.PENETRATES
