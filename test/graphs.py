@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import pytest
@@ -60,8 +61,14 @@ def recordings_of(first: Graph, second: Graph, monkeypatch: pytest.MonkeyPatch) 
     return [bag.read(graph.bag) for graph in (first, second)]
 
 
-def rewritten(old: Path, new: Path, beside: str = "", late_ns: int = 0, **options: Any) -> None:
-    """A copy of a file by the library's own writer with its options, a topic beside, and all of it so much later."""
+def rewritten(
+    old: Path, new: Path, beside: str = "", late_ns: int = 0, without: Mapping[str, int] = MappingProxyType({}),
+    **options: Any,
+) -> None:
+    """A copy of a file by the library's own writer with its options.
+
+    With a topic beside, all of it so much later, and `without` the messages of topics from a time in ns on.
+    """
     with old.open("rb") as file, new.open("wb") as copy:
         reader, writer, channels = make_reader(file), Writer(copy, **options), dict[int, int]()
         writer.start("ros2", "another program")
@@ -69,6 +76,8 @@ def rewritten(old: Path, new: Path, beside: str = "", late_ns: int = 0, **option
             writer.add_metadata(record.name, record.metadata)
         writer.add_attachment(0, 0, "notes.txt", "text/plain", b"of somebody")
         for schema, channel, message in reader.iter_messages(log_time_order=False):
+            if message.log_time >= without.get(channel.topic, message.log_time + 1):
+                continue
             if channel.id not in channels:
                 of = writer.register_schema(schema.name, schema.encoding, schema.data)
                 channels[channel.id] = writer.register_channel(channel.topic, channel.message_encoding, of)

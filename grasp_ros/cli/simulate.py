@@ -17,7 +17,10 @@ from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, UNITS
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene
 from grasp_ros.simulation import GRID_POINTS, simulate
+from grasp_ros.simulation.ticks import tick_times
 
 
 def add_to(commands: Any) -> None:
@@ -25,7 +28,8 @@ def add_to(commands: Any) -> None:
     add_json(add_command(commands, "methods", _methods))
     sub = add_command(commands, "simulate", _simulate)
     add_scene(sub)
-    sub.add_argument("--grid", type=whole(2), metavar="N", help=f"equidistant output times (default {GRID_POINTS})")
+    sub.add_argument("--grid", type=whole(2), metavar="N",
+                     help=f"equidistant output times (default {GRID_POINTS}; with --sampled all control periods)")
     sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
     sub.add_argument("--controller", dest="controllers", action="append", default=[], metavar="SIDE=MODULE:OBJECT",
                      help="a callable of tick, time, x, v and what it asks for by name, in place of the feedback")
@@ -70,7 +74,7 @@ def _simulate(options: argparse.Namespace) -> int:
     sampled = options.sampled or bool(controllers)
     check_memory(scene, sampled, options.grid)
     check_output(options.output, (".npz", ".csv"), options.force, [options.scene])
-    grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
+    grid = None if options.grid is None else _grid(scene, sampled or scene.sampled, options.grid)
     prepare()
     with bar(scene.duration, "s", scene.name) as progress:
         trajectory = simulate(
@@ -91,6 +95,12 @@ def _simulate(options: argparse.Namespace) -> int:
         with destination(options.output) as file:
             (trajectory.save if options.output.suffix.lower() == ".npz" else trajectory.to_csv)(file)
     return 0 if trajectory.status is Status.DONE else 1
+
+
+def _grid(scene: Scene, sampled: bool, number: int) -> Array:
+    """Equidistant output times (n,) in s; ticks to the bit: a rounding before one the last command still acts."""
+    every, rest = divmod(scene.ticks, number - 1)
+    return np.linspace(0.0, scene.duration, number) if rest or not (sampled and every) else tick_times(scene)[::every]
 
 
 def _setting(options: argparse.Namespace) -> float | None:

@@ -49,7 +49,7 @@ class View:
     """Draws moments of one scene, whose initial state gives the scale of the line, and a hint to the keys there are."""
 
     def __init__(self, scene: Scene, hint: str = "") -> None:
-        self.scene, self._hint = scene, hint
+        self.scene, self.hint = scene, hint
         places = np.abs(scene.initial_state[0::2])
         self._reach = 1.25 * float(places.max()) or 1.0
         self._most = 0.0  # energy shown so far, J
@@ -58,7 +58,7 @@ class View:
         """A renderable of rich for a terminal with so many columns."""
         width = min(max(width, LEAST), WIDEST)
         self._reach = max(self._reach, float(np.nanmax(np.abs(moment.state[0::2]))))
-        hint = [Text(self._hint, style="dim")] if self._hint else []
+        hint = [Text(self.hint, style="dim")] if self.hint else []
         parts = Group(
             self._line(moment.state, width - 8), self._ruler(width - 8), "", self._bodies(moment, width < NARROW), "",
             *self._energy(moment.level, width), *hint,
@@ -95,23 +95,23 @@ class View:
             x, v = moment.state[COLUMN[body] : COLUMN[body] + 2]
             if not np.isnan(x):
                 forces = [moment.commands.get(name), moment.impacts.get(name)] if name in SIDES else [None, None]
-                words = ["" if force is None else f"{force:+.{places - 1}f}" for force in forces]
+                words = ["" if force is None or np.isnan(force) else f"{force:+.{places - 1}f}" for force in forces]
                 table.add_row(Text(name, style=STYLES[name]), f"{x:+.{places}f}", f"{v:+.{places}f}", *words)
         return table
 
     def _energy(self, level: Mapping[str, float], width: int) -> list[RenderableType]:
+        if np.isnan(level.get("V_plant", np.nan)):
+            return [Text("energy and contacts: not known without lyapunov")]
         closed, bar = level.get("closed") == 1.0, max(width - 50, 6)
         names = ("V_c", "V") if closed else ("V_plant",)
         table = Table(box=None, padding=(0, 1 if width < NARROW else 2), show_header=False, pad_edge=width >= NARROW)
         for name in names:
-            value = level.get(name, np.nan)
-            self._most = np.nanmax([self._most, value])
-            filled = 0 if np.isnan(value) or not self._most else round(bar * max(value, 0.0) / self._most)
+            value = level[name]
+            self._most = max(self._most, value)
+            filled = round(bar * max(value, 0.0) / self._most) if self._most else 0
             table.add_row(name, f"{value:.6g} J", Text("█" * filled, style="green" if closed else "yellow"))
-        mode = Mode(int(np.nan_to_num(level.get("mode", 0.0))))
-        table.add_row("contact", CONTACT[mode], "")
-        alarm = level.get("alarm", 0.0) == 1.0
-        table.add_row("balance", Text("ALARM", style="bold red") if alarm else "closes", "")
+        table.add_row("contact", CONTACT[Mode(int(level["mode"]))], "")
+        table.add_row("balance", Text("ALARM", style="bold red") if level["alarm"] == 1.0 else "closes", "")
         return [table] if closed else [table, "V: no law is announced, or another one ran"]
 
 

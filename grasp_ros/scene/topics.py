@@ -92,14 +92,17 @@ def named(values: Iterable[float]) -> dict[str, float]:
 
 
 class Numbers:
-    """Counts the announcements of a controller that are missing: they are numbered from 1 on, where it numbers them."""
+    """Counts the announcements of a controller that are missing: they are numbered from 1 on, where it numbers them.
 
-    def __init__(self) -> None:
-        self._last = 0
+    `late`: somebody who may have come late misses none before the first one.
+    """
+
+    def __init__(self, late: bool = False) -> None:
+        self._last = None if late else 0
 
     def take(self, message: Any) -> int:
         """How many are missing between the message before and this one."""
         word = message.header.frame_id
         number = int(word) if word.isascii() and word.isdecimal() and len(word) < MOST_DIGITS else 0
         before, self._last = self._last, number
-        return max(number - before - 1, 0) if before and number else 0
+        return max(number - before - 1, 0) if before is not None and number else 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -139,6 +140,27 @@ def test_a_bag_of_another_make_is_read_or_refused_and_not_called_damaged(
     assert found.returncode == (2 if "allowed" in words else 0)
     if found.returncode:
         assert words.partition(";")[0] in command("recover", "new.mcap").stderr
+
+
+@pytest.mark.parametrize(("without", "tick", "lost"), [
+    ({"/lyapunov": 0}, 0, {"lyapunov": 3001}), ({"/lyapunov": 2_999_000_000}, 2999, {"lyapunov": 2}),
+    ({"/joint_states": 2_990_000_000}, 3001, {"joint_states": 11})])
+def test_what_does_not_follow_without_the_messages_that_a_bag_lacks_is_not_told(
+    two_runs: tuple[Path, Path], tmp_path: Path, command: Any, without: dict[str, int], tick: int, lost: dict[str, int]
+) -> None:
+    """No contacts, a balance that closes at every tick, and -11 messages lost were told."""
+    rewritten(two_runs[0] / "bag" / "bag.mcap", tmp_path / "new.mcap", without=without)
+    whole, found = (json.loads(command("inspect", str(path), "--json").stdout)
+                    for path in (two_runs[0] / "bag", tmp_path / "new.mcap"))
+    assert lost.items() <= found["missing"].items()
+    assert found["contacts"] == whole["contacts"]
+    assert found["balanced_ticks"] == min(tick, found["ticks"])
+    assert (found["work_J"] is None) is ("lyapunov" in lost)
+    verified = command("verify", "new.mcap")
+    name, number = next(iter(lost.items()))
+    assert (verified.returncode, f"the bag lacks {name} of {number} ticks" in verified.stdout) == (1, True)
+    if "lyapunov" in lost:
+        assert f"closes at {tick} ticks, others are not known" in command("inspect", "new.mcap").stdout
 
 
 def test_the_directory_of_a_run_is_no_bag_and_says_where_it_is(two_runs: tuple[Path, Path], command: Any) -> None:

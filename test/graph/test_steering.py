@@ -185,9 +185,9 @@ def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
     message = json.loads(ask("echo joint_states 1"))
     assert message["name"] == ["left"]
     assert "One arm by itself" in ask("echo scene 1")  # said before this reader came
-    refused = ["set plant steps 0", f"set plant steps {10 ** 20}", f"set plant steps [{10 ** 20}]",
+    refused = ["set plant steps 0", f"set plant steps {10 ** 20}", f"set plant steps [{10 ** 20}]", f"step {2 ** 63}",
                "set plant steps [1,a]", "step",  # while it is there
-               f"step {10 ** 20 - 1}", "echo a//b", "get a!b", "pause now", "nonsense",
+               f"step {10 ** 20 - 1}", "echo a//b", "get a!b", 'get ""', "pause now", "nonsense",
                "step x", "step 0",
                "set left_controller law x", f"set left_controller {gain} -100",
                "set left_controller left_feedback.position_gain 9"]

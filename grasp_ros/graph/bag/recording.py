@@ -259,13 +259,13 @@ class Recording(Tabular, Frozen):
 
     @property
     def missing(self) -> dict[str, int]:
-        """Ticks up to the last one recorded that have no message, by topic; without the commands of a free run.
+        """Ticks up to the last one that the bag shows without a message, by topic; not of commands in a free run.
 
         And what is `unheard`, and what the monitor says that it did not record, or did and is not there.
         """
-        ticks = int(self.tick.max(initial=-1)) + 1
         held = () if self.running.lockstep else self.scene.controllers.values()
         every_tick = [topic.name for topic in (CLOCK, *self.scene.topics) if topic not in held]
+        ticks = max(int(self.tick.max(initial=-1)) + 1, *(self.counts[name] for name in every_tick))
         there = sum(self.counts.values())
         others = {NOT_RECORDED: int(self.lost.get(NOT_RECORDED, 0)),
                   WRITTEN: int(self.lost.get(WRITTEN, there)) - there}

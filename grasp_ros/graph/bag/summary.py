@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_ros.graph.bag.recording import Recording, check_recording
 from grasp_ros.graph.bag.verify import Verification
-from grasp_ros.physics.model import Array, Mode
+from grasp_ros.physics.model import Mode
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
 
 
@@ -46,20 +48,22 @@ def summary(recording: Recording) -> dict[str, Any]:
 
 
 def _levels(recording: Recording) -> dict[str, Any]:
-    """Contacts, energies and their balance."""
-    named = dict(zip(LYAPUNOV_NAMES, recording.lyapunov.T, strict=True))
-    level = recording.energy
+    """Contacts, energies and their balance; the work is NaN where the monitor's numbers are not whole."""
+    work, level = recording.lyapunov[:, LYAPUNOV_NAMES.index("work")], recording.energy
+    balanced = int(np.count_nonzero(~np.isnan(work)))
+    whole = balanced == recording.tick[-1] + 1
     return {
-        "contacts": {side: _beginnings(recording, named["mode"], flag)
+        "contacts": {side: _beginnings(recording, level.mode, flag)
                      for side, flag in (("left", Mode.LEFT), ("right", Mode.RIGHT))},
         "energy_of": recording.energy_of, "V_J": level.V[[0, -1]].tolist(),
         "V_c_J": level.V_c[[0, -1]].tolist(),
-        "work_J": 0.5 * float(np.nansum(named["work"])), "alarms": recording.alarms,
+        "work_J": 0.5 * float(np.sum(work)) if whole else math.nan, "balanced_ticks": balanced,
+        "alarms": recording.alarms,
     }
 
 
-def _beginnings(recording: Recording, mode: Array, flag: Mode) -> int:
-    touching = (np.nan_to_num(mode).astype(int) & int(flag)) != 0
+def _beginnings(recording: Recording, mode: NDArray[np.int64], flag: Mode) -> int:
+    touching = (mode & int(flag)) != 0
     before = np.append(False, touching[:-1]) & ~np.isin(recording.tick, recording.starts)  # a reset begins anew
     return int(np.count_nonzero(touching & ~before))
 

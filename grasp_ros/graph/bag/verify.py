@@ -136,7 +136,7 @@ def answers_of(recording: Recording) -> dict[str, Answers]:
 
 def _same_without_ros(recording: Recording, answers: dict[str, Answers]) -> bool | None:
     """Whether the scene with its own laws has the recorded states and commands, without a graph."""
-    others = any(found.differs or found.commands < len(recording.tick) for found in answers.values())
+    others = any(found.differs or found.lost or found.commands < len(recording.tick) for found in answers.values())
     late = len(recording.starts) > 1 or recording.tick[-1] > recording.scene.ticks
     if others or late or not recording.running.lockstep:
         return None
@@ -159,8 +159,8 @@ def _gap(recording: Recording, lost: Mapping[str, np.ndarray]) -> str:
         return f"tick {recording.tick[missing[0]] + 1} is missing: what acted then is not known"
     words = [f"{name} of {np.count_nonzero(rows)} ticks, the first {recording.tick[np.argmax(rows)]}"
              for name, rows in lost.items() if rows.any()]
-    if (without := recording.missing[CLOCK.name]) > 0:
-        words.append(f"{CLOCK.name} of {without} ticks")
+    words += [f"{topic.name} of {without} ticks" for topic in (CLOCK, JOINT_STATES)
+              if (without := recording.missing[topic.name])]
     if cut := recording.missing.get(WRITTEN):
         words.append(f"{cut} messages that its recorder has written")
     for side, forces in recording.held.items():

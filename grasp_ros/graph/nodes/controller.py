@@ -114,7 +114,10 @@ class Controller(PeerNode):
         try:
             if self._scene is not None:
                 numbers, before = _numbers(parameters), self._scene.numbers_of(self._executable)
-                self._check_own({name: number for name, number in numbers.items() if number != before.get(name)})
+                others = {name: number for name, number in numbers.items() if number != before.get(name)}
+                if others and self.phase is Phase.IDLE:
+                    raise SceneError(f"{', '.join(others)}: there is no plant, and the next one brings its own numbers")
+                self._check_own(others)
                 self._scene.changed({**self._staged, **numbers})
         except SceneError as error:
             return SetParametersResult(successful=False, reason=str(error))

@@ -81,7 +81,7 @@ class Monitor(PeerNode):
         self._due: list[tuple[int, Tick, list[tuple[Topic, bytes]]]] = []  # time in the bag, tick, what comes beside
         self._others: list[Subscription] = []  # of what does not come with every state
         self._published, self._advanced = b"", 0.0  # for the last tick, and the wall time at which it came
-        self._numbers = {side: Numbers() for side in CHANGES}  # of the announcements
+        self._numbers = {side: Numbers(late=True) for side in CHANGES}  # of the announcements
         self._early: deque[tuple[Topic, bytes]] = deque(maxlen=1000)  # what comes beside before the first state
         self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
         self._plant, self._at_end = "", False  # identity of the one that is recorded; whether its last tick is

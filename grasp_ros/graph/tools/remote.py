@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 import time
@@ -17,6 +18,7 @@ from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy
+from rclpy.serialization import serialize_message
 from std_srvs.srv import Trigger
 
 from grasp_ros.graph.host import place
@@ -88,7 +90,7 @@ class Remote(GraspNode):
         """
         action = self._actions.get(words[0])
         wrong = f"{' '.join(words)}: not allowed; allowed: {HELP}"
-        if action is None:
+        if action is None or "" in words:
             raise Refused(wrong)
         try:
             signature(action).bind(*words[1:])
@@ -151,9 +153,11 @@ class Remote(GraspNode):
 
     def _set(self, node: str, name: str, value: Any) -> None:
         try:
-            request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+            message = Parameter(name, value=value).to_parameter_msg()
+            serialize_message(message)  # which a call would do, where it is too late to refuse
         except (TypeError, OverflowError, AssertionError, SystemError):  # of the library for what no message holds
             raise Refused(f"{name}: {value} is not allowed; allowed: what a parameter of ROS can be") from None
+        request = SetParameters.Request(parameters=[message])
         [result] = self._ask(SetParameters, f"{node}/set_parameters", request).results
         if not result.successful:
             raise Refused(result.reason)
@@ -190,7 +194,7 @@ class Remote(GraspNode):
         if name not in self._known:
             self._known[name] = self.create_client(kind, name)
         client = self._known[name]
-        nobody = f"no {name.split('/')[0]} answers {place(os.environ, self.get_namespace())}"
+        nobody = f"no {name.rpartition('/')[0]} answers {place(os.environ, self.get_namespace())}"
         self._wait(client.service_is_ready, nobody)
         future = client.call_async(request)
         self._wait(future.done, nobody)
@@ -224,6 +228,8 @@ def _plain(value: Any) -> Any:
         return {name: _plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
     if isinstance(value, (list, tuple, array)):
         return [_plain(part) for part in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
     return value.hex() if isinstance(value, bytes) else value
 
 

@@ -97,12 +97,12 @@ class Watch(GraspNode):
         self._asked = -math.inf  # since when an answer is waited for
         self.wall_timer(STATUS_SECONDS, self._ask_status)
         self.wall_timer(FRAME_SECONDS, self._look)
-        self._keys, self._pressed = Keys(), list[Key]()
+        self._keys, self._pressed, self._stepped = Keys(), list[Key](), -math.inf  # the last: since when one is done
         self._keys.start()
 
     def _on_scene(self, message: Any) -> None:
         scene = scenes.parse(message.data, SCENE.name, f"topic {SCENE.name}")
-        self._view = View(scene, HINT if self._keys.there else "")
+        self._view = View(scene)
         self._newest = Newest()
 
     def _on_run(self, message: Any) -> None:
@@ -116,14 +116,25 @@ class Watch(GraspNode):
         """Do what keys ask for, and draw."""
         self._pressed += self._keys.pressed()
         self.finished |= Key.QUIT in self._pressed
-        if self._view is None or all(client.service_is_ready() for client in self._asks.values()):  # else they wait
-            for key in self._pressed:
-                if key is Key.PAUSE:  # refused by a plant that is paused
-                    self._ask("pause", lambda answer: None if answer.success else self._ask("resume"))
-                elif key is Key.FORWARD:
-                    self._ask("pause", lambda _: self._ask("steps", lambda _: self._ask("step")))
+        if self._view is None:
             self._pressed.clear()
+        elif all(client.service_is_ready() for client in self._asks.values()):  # otherwise they wait
+            self._view.hint = HINT if self._keys.there else ""
+            if self._pressed and time.monotonic() > self._stepped + LOST_SECONDS:
+                self._do(self._pressed.pop(0))
         self._draw()
+
+    def _do(self, key: Key) -> None:
+        """Do what a key asks for; the next one waits for the answer: a plant refuses a step beside another one."""
+
+        def done(_: Any) -> None:
+            self._stepped = -math.inf
+
+        self._stepped = time.monotonic()
+        if key is Key.PAUSE:  # refused by a plant that is paused
+            self._ask("pause", lambda answer: done(answer) if answer.success else self._ask("resume", done))
+        elif key is Key.FORWARD:
+            self._ask("pause", lambda _: self._ask("steps", lambda _: self._ask("step", done)))
 
     def _ask(self, name: str, then: Callable[[Any], None] = lambda _: None) -> None:
         """Call a service of the plant, if it is there; then go on with its answer."""
