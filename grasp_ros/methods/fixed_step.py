@@ -177,11 +177,10 @@ def renew_modes(q: Any, y: Any, t: float, mode: Any, changed: Any, events: Any, 
         now = condition(q, y, side)
         if now == mode[side] or changed[side] == t:
             continue
-        if now == CONTACT or mode[side] == CONTACT:
-            if found == events.shape[0]:
-                return -1
-            note(events, found, t, side, kind_of(mode[side], now), y)
-            found += 1
+        if found == events.shape[0]:
+            return -1
+        note(events, found, t, side, kind_of(mode[side], now), y)
+        found += 1
         mode[side] = now
     return found
 

@@ -72,7 +72,7 @@ def solve(name: str, located: bool, problem: Problem) -> Solution:
     """Integrate with one of scipy's solvers, rtol = atol: from event to event if they are located, or at one go."""
     q, work = parameters(problem.system), np.zeros(len(Work), dtype=np.int64)
     grid, place = np.unique(problem.grid, return_inverse=True)  # scipy refuses a time that comes twice
-    t, y, row, idle, states = 0.0, problem.system.state, 0, 0, []
+    t, y, row, idle, states = 0.0, problem.system.state, 0, 0, [np.empty((0, 6))]
     mode = [int(condition(q, tuple(y), side)) if located else CONTACT for side in SIDES]
     gaps = [_gaps(side, problem.system.pairs[side, Law.DISSIPATION], work) for side in SIDES if located]
     events: list[tuple[float, ...]] = []
@@ -80,7 +80,11 @@ def solve(name: str, located: bool, problem: Problem) -> Solution:
     while status is None:
         active = [gap for side, own in enumerate(gaps) for gap in own[mode[side]]]
         args = (q, mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT)
-        result = _integrate(name, (t, problem.duration), y, grid[row:], args, problem, active or None, work)
+        try:
+            result = _integrate(name, (t, problem.duration), y, grid[row:], args, problem, active or None, work)
+        except ValueError:  # of its search for an event: its interpolation has no zero where its steps have one
+            status = Status.STALLED
+            break
         states.append(np.reshape(result.y, (6, -1)).T)
         row += len(states[-1])
         if result.status != AT_EVENT or idle > MAX_IDLE:

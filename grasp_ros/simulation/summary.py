@@ -9,6 +9,7 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import METHODS
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
@@ -69,7 +70,7 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
         ends, at = np.stack([scene.initial_state, [row[name] for name in GROUPS["last_state"]]]), [0.0, scene.duration]
     level = energy(scene.system, ends, feedback=not run.controllers).V_c
     found: dict[str, Any] = {"energy_of": run.energy_of, "V_c_J": level.tolist(), "V_c_at_s": at}
-    if not METHODS[run.method].energy_check:
+    if not METHODS[run.method].energy_check or (run.setting > ACCURACY and not may_rise(run)):
         V_c = known.energy.V_c
         found["V_c_rise_J"] = float((V_c - np.minimum.accumulate(V_c)).max())
     if settles and not np.isnan(settled := settled_of(known, row)).any():

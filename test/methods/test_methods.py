@@ -7,6 +7,7 @@ import pytest
 from documents import horizon, stalling
 from oracles import ELASTIC, STANDARD, impact, make_grasp, reduced_mass
 
+from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods import library
 from grasp_ros.methods.contract import STEP
@@ -89,8 +90,32 @@ def test_a_coarse_method_misses_contacts_and_does_not_hide_it() -> None:
 
 def test_a_step_that_is_unstable_ends_with_a_status() -> None:
     scene = horizon("case_01", 2000.0, "left_arm.damping_Ns_per_m=1e3")
-    assert simulate(scene, method="rk4", setting=0.1).status is Status.NOT_FINITE
+    unstable = simulate(scene, method="rk4", setting=0.1)
+    assert unstable.status is Status.OUTSIDE
+    assert np.abs(unstable.state).max() <= 1e12
     assert simulate(scene, method="discrete_gradient", setting=0.1).status is Status.DONE
+
+
+def test_a_search_of_scipy_that_fails_is_a_status() -> None:
+    """Its interpolant of LSODA jumps, so that its search for an event may find no change of sign: a ValueError."""
+    scene = scenes.load("v_jump_one_sided", [
+        "time.duration_s=2", "left_arm.stiffness_N_per_m=10.56812222328861",
+        "left_arm.velocity_m_per_s=0.21371253780294563", "object.mass_kg=1.3671484488976535",
+        "right_arm.stiffness_N_per_m=6.270478803320879", "right_arm.damping_Ns_per_m=0.33385105385782143",
+        "right_arm.position_m=0.5043234483190907", "left_contact.hertz_N_per_m1_5=345130052.0775655",
+        "left_contact.dissipation_s_per_m=28.639568307898337", "right_contact.hertz_N_per_m1_5=1765.508317106146",
+        "right_contact.dissipation_s_per_m=10.339979984759909",
+        "left_feedback.position_gain_N_per_m=12.268493623565796"])
+    motion = simulate(scene, method="lsoda_events", setting=1e-6)
+    assert motion.status is Status.STALLED
+    assert 0 < len(motion.t) < 2001
+
+
+def test_the_method_of_the_paper_records_the_release_of_a_clamped_pair() -> None:
+    paper, exact = (simulate(scenes.load("v_jump_one_sided"), **how).contacts("left")
+                    for how in ({"method": "paper", "setting": 1e-4}, {}))
+    assert len(paper) == len(exact) == 2
+    assert paper["end"] == pytest.approx(exact["end"], abs=1e-3)
 
 
 def test_exact_is_the_default_and_its_setting_is_the_accuracy() -> None:
