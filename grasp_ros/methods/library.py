@@ -6,6 +6,7 @@ terminal events, and starts afresh after each.
 
 from __future__ import annotations
 
+import math
 import warnings
 from typing import Any
 
@@ -30,7 +31,7 @@ from grasp_ros.physics.layout import LEFT, RIGHT, Law
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import PAIR_COLUMNS
 
-TOGETHER = 1e-13  # m or m/s; a gap below this at the other side's event is an event of both
+TOGETHER = 1e-13  # m or m/s, or a part of the horizon; a gap below this at the other side's event is an event of both
 MAX_IDLE = 100  # events without progress in time
 AT_END, AT_EVENT = 0, 1  # where scipy says that it stopped; negative: it failed
 IMPLICIT = ("Radau", "LSODA")  # solvers that take a Jacobian
@@ -93,12 +94,14 @@ def solve(name: str, located: bool, problem: Problem) -> Solution:
         first = next(gap for gap, times in zip(active, result.t_events, strict=True) if len(times))
         at = result.t_events[active.index(first)][0]
         y = result.y_events[active.index(first)][0]
-        idle = 0 if at > t else idle + 1
+        idle = 0 if at - t > TOGETHER * problem.duration else idle + 1
         t = at
         f = slopes(t, y, *args)
         for gap in (first, *(gap for gap in active if gap.side != first.side and gap.fires_too(y, f))):
             events.append((t, gap.side, kind_of(mode[gap.side], gap.after), *relative(y, gap.side)))
             mode[gap.side] = gap.after
+            for following in gaps[gap.side][gap.after]:
+                following.begin = t
         status = Status.EVENT_BUDGET if len(events) > problem.max_events else None
     found = np.concatenate(states)  # as far as it came, at distinct times
     return Solution(found[place[place < len(found)]], np.array(events).reshape(-1, 5), work, status)
@@ -113,10 +116,16 @@ class _Gap:
         self.side, self.after, self.direction, self._work = side, after, direction, work
         self._front, self._back = (column + (p is not None) for column in PAIR_COLUMNS[side])
         self._offset = 0.0 if p is None else 1.0 / p
+        self.begin = math.nan  # time in s of an event of its pair, with which this gap became active
 
     def __call__(self, t: float, y: Array, *_: Any) -> float:
+        """Its value in m or m/s.
+
+        Of the same zero again, in a step that comes back to it, scipy would make an event: so it lies before it.
+        """
         self._work[Work.EVENT_EVALUATIONS] += 1
-        return float(y[self._front] - y[self._back] + self._offset)
+        value = float(y[self._front] - y[self._back] + self._offset)
+        return -self.direction * TOGETHER if t == self.begin and value * self.direction >= 0.0 else value
 
     def fires_too(self, y: Array, f: Array) -> bool:
         """Whether it fires with another one: equal arms at rest reach the object at the same instant.
@@ -124,7 +133,7 @@ class _Gap:
         scipy would lose it: a function that is zero, or a rounding past it, where a step begins is no event.
         """
         moving = self.direction * (f[self._front] - f[self._back]) > 0.0
-        return bool(moving and abs(self(0.0, y)) < TOGETHER)
+        return bool(moving and abs(self(math.nan, y)) < TOGETHER)
 
 
 def _gaps(side: int, p: float, work: Any) -> dict[int, list[_Gap]]:

@@ -13,7 +13,7 @@ from grasp_ros.methods import library
 from grasp_ros.methods.contract import STEP
 from grasp_ros.methods.equations import parameters
 from grasp_ros.methods.registry import EXACT, METHODS
-from grasp_ros.physics.layout import LEFT, RIGHT, Transition
+from grasp_ros.physics.layout import LEFT, RIGHT, Entry, Transition
 from grasp_ros.simulation import Trajectory, simulate
 from lab.oracles.closed_forms import elastic_period
 from lab.reference.grasp import system_of
@@ -111,6 +111,20 @@ def test_a_search_of_scipy_that_fails_is_a_status() -> None:
     assert 0 < len(motion.t) < 2001
 
 
+def test_an_event_is_not_met_again_in_a_step_that_comes_back_to_it() -> None:
+    """6 of 100 such scenes ended STALLED after a hundred events at one instant: a root search ended where it began."""
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        scene = horizon("case_04", 2.0)
+        scene = scene.changed({f"{section}.{key}": value * 10.0 ** rng.uniform(-0.4, 0.4)
+                               for section, keys in scene.values.items() if section != "time"
+                               for key, value in keys.items() if isinstance(value, float)})
+        motion = simulate(scene, method="dop853_events")
+        assert motion.status is Status.DONE
+        for side in (LEFT, RIGHT):
+            assert (np.diff(motion.event_table[motion.event_table[:, Entry.BODY] == side, Entry.TIME]) > 0.0).all()
+
+
 def test_the_method_of_the_paper_records_the_release_of_a_clamped_pair() -> None:
     paper, exact = (simulate(scenes.load("v_jump_one_sided"), **how).contacts("left")
                     for how in ({"method": "paper", "setting": 1e-4}, {}))
@@ -140,7 +154,7 @@ def test_elastic_arm_keeps_its_period() -> None:
 
 
 def test_events_without_progress_end_with_a_status() -> None:
-    """scipy on case 2: a touch and a release at the same instant, for ever."""
-    motion = simulate(horizon("case_02", 20.0), method="dop853_events", setting=stalling())
+    """LSODA at u' = -1/p: out of contact and back at the same instant, for ever, because its interpolation jumps."""
+    motion = simulate(horizon("v_jump_one_sided", 5.0), method="lsoda_events", setting=stalling())
     assert motion.status is Status.STALLED
-    assert motion.t[-1] < 20.0
+    assert motion.t[-1] < 5.0
