@@ -48,8 +48,9 @@ from grasp_ros.physics.layout import EPS, LEFT, RIGHT
 
 PLAIN, PAPER, LOCATED = 0, 1, 2
 MOST_EVENTS = 10**6  # rows of memory, which is only taken where it is written
-DONE, NOT_FINITE, EVENTS_FULL = 0, 1, 2
-_STATUS = (Status.DONE, Status.NOT_FINITE, Status.EVENT_BUDGET)
+MAX_IDLE = 100  # events without progress in time
+DONE, NOT_FINITE, EVENTS_FULL, STALLED = range(4)
+_STATUS = (Status.DONE, Status.NOT_FINITE, Status.EVENT_BUDGET, Status.STALLED)
 
 
 def solve(rule: int, problem: Problem) -> Solution:
@@ -188,7 +189,7 @@ def renew_modes(q: Any, y: Any, t: float, mode: Any, changed: Any, events: Any, 
 @allocating
 def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out: Any, events: Any, work: Any) -> Any:
     """All steps; returns the outcome and how many rows of `out` and of `events` are filled."""
-    row, found, number, t = 0, 0, 0, 0.0
+    row, found, number, idle, t = 0, 0, 0, 0, 0.0
     mode, free = np.zeros(2, dtype=np.int64), np.ones(2, dtype=np.bool_)
     changed = np.full(2, -1.0)  # time of the last event
     for side in (LEFT, RIGHT):
@@ -222,6 +223,9 @@ def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out:
             if row < grid.shape[0] and grid[row] <= reached:
                 g = rates(q, push_l, push_r, z)
                 row = deliver(rule == PAPER and theta <= 1.0, y, f, z, g, t, reached, grid, out, row)
+            idle = 0 if reached - t > SLIVER * step else idle + 1
+            if idle > MAX_IDLE:
+                return STALLED, row, found
             y, t = z, reached
             if theta <= 1.0:
                 if found == events.shape[0]:

@@ -125,6 +125,19 @@ def test_an_event_is_not_met_again_in_a_step_that_comes_back_to_it() -> None:
             assert (np.diff(motion.event_table[motion.event_table[:, Entry.BODY] == side, Entry.TIME]) > 0.0).all()
 
 
+def test_events_at_one_instant_end_a_fixed_step_too() -> None:
+    """An unstable step: out of contact and back a million times, until there was no room for more."""
+    scene = scenes.load("case_07", [
+        "time.duration_s=5", "left_arm.damping_Ns_per_m=0.1357635166552581",
+        "left_arm.velocity_m_per_s=-0.6249738869723416", "right_arm.mass_kg=0.3853191693626619",
+        "right_arm.position_m=1.2430264123842492", "left_contact.hertz_N_per_m1_5=896435.4461600222",
+        "left_contact.dissipation_s_per_m=0.06126369134057518", "right_contact.hertz_N_per_m1_5=8122.031907769464",
+        "right_feedback.position_gain_N_per_m=5.62736875341916"])
+    motion = simulate(scene, method="rk4_events", setting=0.3)
+    assert motion.status is not Status.DONE
+    assert motion.counters["steps"] < 10_000
+
+
 def test_the_method_of_the_paper_records_the_release_of_a_clamped_pair() -> None:
     paper, exact = (simulate(scenes.load("v_jump_one_sided"), **how).contacts("left")
                     for how in ({"method": "paper", "setting": 1e-4}, {}))
