@@ -191,7 +191,8 @@ def test_the_picture_of_the_page_is_one_state() -> None:
     run = simulate(scene.load("case_01", ["time.duration_s=8"]), sampled=True)
     view, level, impacts = View(run.scene, HINT), run.energy, run.impacts
     for row in (0, tick):
-        known = {"V": level.V[row], "V_c": level.V_c[row], "mode": float(level.mode[row]), "closed": 1.0}
+        known = {"V": level.V[row], "V_c": level.V_c[row], "mode": float(level.mode[row]), "closed": 1.0, "alarm": 0.0,
+                 "V_plant": 0.0}
         moment = Moment(float(run.t[row]), run.state[row], dict(zip(CONTACTS, run.command[row], strict=True)),
                         dict(zip(CONTACTS, impacts[row], strict=True)), known, words)
         picture = view.draw(moment)
