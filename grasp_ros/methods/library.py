@@ -104,6 +104,7 @@ def solve(name: str, located: bool, problem: Problem) -> Solution:
                 following.begin = t
         status = Status.EVENT_BUDGET if len(events) > problem.max_events else None
     found = np.concatenate(states)  # as far as it came, at distinct times
+    found[grid[: len(found)] == 0.0] = problem.system.state  # which LSODA interpolates
     return Solution(found[place[place < len(found)]], np.array(events).reshape(-1, 5), work, status)
 
 

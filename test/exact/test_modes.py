@@ -719,7 +719,8 @@ def test_pairs_begin_alike(side: Body) -> None:
 @SIDES
 @pytest.mark.parametrize(("u", "d", "mode", "expected"), [
     (1e-30, 0.1, Pair.BEGINNING, Pair.CONTACT), (1e-30, -0.1, Pair.BEGINNING, Pair.CONTACT),
-    (0.0, 0.1, Pair.BEGINNING, Pair.CONTACT), (0.0, 0.0, Pair.BEGINNING, Pair.BEGINNING),
+    (1e-30, 0.0, Pair.BEGINNING, Pair.CONTACT), (0.0, 0.1, Pair.BEGINNING, Pair.CONTACT),
+    (0.0, 0.0, Pair.BEGINNING, Pair.BEGINNING),
     (0.0, -0.1, Pair.BEGINNING, Pair.OPEN), (-1e-30, 0.1, Pair.BEGINNING, Pair.OPEN),
     (1e-9, 0.1, Pair.LEAVING, Pair.LEAVING), (-1e-9, 0.1, Pair.OPEN, Pair.OPEN)])
 def test_a_pair_that_has_begun_is_in_contact_or_has_come_back(side: Body, u: float, d: float, mode: Pair, expected: Pair

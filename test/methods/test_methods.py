@@ -111,6 +111,15 @@ def test_a_search_of_scipy_that_fails_is_a_status() -> None:
     assert 0 < len(motion.t) < 2001
 
 
+@pytest.mark.parametrize("name", STEPPING)
+def test_the_first_state_is_the_initial_one(name: str) -> None:
+    """LSODA interpolates it, and so rounded one in some of these."""
+    for speed in np.linspace(0.1, 1.0, 20).tolist():
+        scene = horizon("case_01", 0.1, f"left_arm.velocity_m_per_s={speed!r}", f"object.velocity_m_per_s={-speed!r}")
+        motion = simulate(scene, method=name, setting=1e-3, grid=[0.0, 0.0, 0.1])
+        assert motion.state[:2].tolist() == [scene.system.state.tolist()] * 2
+
+
 def test_an_event_is_not_met_again_in_a_step_that_comes_back_to_it() -> None:
     """6 of 100 such scenes ended STALLED after a hundred events at one instant: a root search ended where it began."""
     rng = np.random.default_rng(3)
