@@ -26,7 +26,7 @@ from grasp_ros.graph.host import check_reach, hold, network
 from grasp_ros.graph.parameters import PEER_SECONDS, quoted
 from grasp_ros.graph.processes import Graph, GraphError, become
 from grasp_ros.graph.running import Running, check_factor
-from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals
+from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals, on_signals
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.topics import JOINT_STATES
 
@@ -132,6 +132,7 @@ def _run(options: argparse.Namespace) -> int:
         print(f"grasp: {error}{_what_is_there(graph.bag)}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
+        on_signals(signal.SIG_IGN)  # a second one would cut the sentence short
         raise KeyboardInterrupt("" if _is_without_ticks(graph.bag) else f"; {graph.bag} was not checked to the end and"
                                 " not drawn; `grasp verify` and `grasp plot` do that") from None
     except Refused:
