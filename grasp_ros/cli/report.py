@@ -124,8 +124,10 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
     resets, missing = found["resets"], [f"{name} {count}" for name, count in found["missing"].items()]
     of = "" if recording.closed else f" of {PLANT_ALONE}"
     left, right = found["contacts"].values()
-    ticks, balanced = found["ticks"], found["balanced_ticks"]
-    none = "none: the law of a controller is not known" if balanced == ticks else "not known without lyapunov"
+    balanced, known = found["balanced_ticks"], not np.isnan(found["work_J"])
+    lacks = balanced < found["ticks"]  # numbers of the monitor
+    none = "not known without lyapunov" if lacks else "none: the law of a controller is not known"
+    closes = "closes at every tick" if known else f"closes at {balanced} ticks, others are not known"
     rows = [
         ("bag", found["bag"]),
         ("size", f"{found['size_bytes'] / 1e6:.3g} MB"),
@@ -139,9 +141,8 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
         ("contacts left, right", f"{left}, {right} seen at the ticks"),
         (f"V{of}", _ends(found["V_J"])), (f"V_c{of}", _ends(found["V_c_J"])),
         ("certificate", recording.scene.certificate_in_words(sampled=True) if recording.closed else none),
-        ("work of the held forces", "not known" if np.isnan(found["work_J"]) else f"{found['work_J']:.6g} J"),
-        ("energy balance", f"{found['alarms']} alarms" if found["alarms"] else "closes at every tick"
-         if not np.isnan(found["work_J"]) else f"closes at {balanced} ticks, others are not known"),
+        ("work of the held forces", f"{found['work_J']:.6g} J" if known else "not known"),
+        ("energy balance", f"{found['alarms']} alarms" if found["alarms"] else closes),
         ("lost", ", ".join(missing) or "nothing"),
         ("end", found["end"]),
         ("recorded with", ", ".join(f"{name} {version}" for name, version in found["recorded_with"].items())

@@ -14,6 +14,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
 
 OPEN, CONTACT, CLAMPED = int(Pair.OPEN), int(Pair.CONTACT), int(Pair.CLAMPED)
+MAX_IDLE = 100  # events without progress in time
 SLIVER = 1e-9  # of a step: what rounding may leave at the end of the horizon
 TOUCH, RELEASE, CLAMP, REENTRY = (int(kind) for kind in tuple(Transition)[:4])
 

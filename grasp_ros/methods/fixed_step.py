@@ -31,6 +31,7 @@ from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.equations import (
     CLAMPED,
     CONTACT,
+    MAX_IDLE,
     OPEN,
     SLIVER,
     Work,
@@ -48,7 +49,6 @@ from grasp_ros.physics.layout import EPS, LEFT, RIGHT
 
 PLAIN, PAPER, LOCATED = 0, 1, 2
 MOST_EVENTS = 10**6  # rows of memory, which is only taken where it is written
-MAX_IDLE = 100  # events without progress in time
 DONE, NOT_FINITE, EVENTS_FULL, STALLED = range(4)
 _STATUS = (Status.DONE, Status.NOT_FINITE, Status.EVENT_BUDGET, Status.STALLED)
 

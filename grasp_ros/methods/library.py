@@ -19,6 +19,7 @@ from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.equations import (
     CLAMPED,
     CONTACT,
+    MAX_IDLE,
     OPEN,
     Work,
     condition,
@@ -32,7 +33,6 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import PAIR_COLUMNS
 
 TOGETHER = 1e-13  # m or m/s, or a part of the horizon; a gap below this at the other side's event is an event of both
-MAX_IDLE = 100  # events without progress in time
 AT_END, AT_EVENT = 0, 1  # where scipy says that it stopped; negative: it failed
 IMPLICIT = ("Radau", "LSODA")  # solvers that take a Jacobian
 SIDES = (int(LEFT), int(RIGHT))
