@@ -11,12 +11,18 @@ from typing import Any
 import numpy as np
 import pytest
 import rclpy
+from builtin_interfaces.msg import Time
 from graphs import written
 from processes import GRASP, START, end_nodes, ran, wait_for
-from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.msg import Parameter as ParameterMsg
+from rcl_interfaces.msg import ParameterValue, SetParametersResult
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rclpy.clock import ClockType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from rclpy.time import Time as RosTime
 from rosbags.typesys import Stores, get_typestore
+from rosgraph_msgs.msg import Clock
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
@@ -61,6 +67,38 @@ def test_a_node_takes_what_it_dumps(loop: tuple[Any, ...]) -> None:
         assert not fixed.successful
         unknown = node.set_parameters_atomically([Parameter("peer_timeout", value=3.0)])
         assert unknown.reason == "peer_timeout: no such parameter; did you mean peer_timeout_s?"
+
+
+def test_what_rclpy_cannot_read_ends_no_node(context: rclpy.Context) -> None:
+    """Its own callbacks raise for a parameter of a type that there is none, and for a negative time."""
+    given = [Parameter("use_sim_time", value=True)]
+    controller = Controller("left_controller", context=context, parameter_overrides=given)
+    peer, executor = rclpy.create_node("peer", context=context), SingleThreadedExecutor(context=context)
+    for node in (controller, peer):
+        executor.add_node(node)
+    clock = peer.create_publisher(Clock, "/clock", 1)
+
+    def answer(kind: Any, name: str, *values: Any) -> Any:
+        client = peer.create_client(kind, f"/left_controller/{name}")
+        wait_for(lambda: executor.spin_once(timeout_sec=0.1) or client.service_is_ready(), "the service")
+        request = kind.Request(parameters=[ParameterMsg(name=key, value=value) for key, value in values])
+        asked = client.call_async(request)
+        wait_for(lambda: executor.spin_once(timeout_sec=0.1) or asked.done(), "an answer")
+        return asked.result()
+
+    strange, no = ("period_s", ParameterValue(type=99)), ("use_sim_time", ParameterValue(type=1, bool_value=False))
+    results = answer(SetParameters, "set_parameters", no, strange, no).results
+    assert [result.successful for result in results] == [False] * 3
+    assert results[0].reason == "use_sim_time: set at the start only, with -p or a parameter file"
+    assert "99" in results[1].reason
+    assert not answer(SetParametersAtomically, "set_parameters_atomically", strange).result.successful
+    for seconds in (-5, 7):
+        clock.publish(Clock(clock=Time(sec=seconds)))
+    seven = RosTime(seconds=7, clock_type=ClockType.ROS_TIME)
+    wait_for(lambda: executor.spin_once(timeout_sec=0.1) or controller.get_clock().now() == seven, "the time")
+    executor.shutdown()
+    peer.destroy_node()
+    end_nodes(controller)
 
 
 def test_numbers_that_somebody_else_refuses_never_act(loop: tuple[Any, ...]) -> None:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import sys
 from array import array
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import chain
 from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.srv import SetParameters
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
+from rclpy.service import Service
+from rclpy.subscription import Subscription
 
 from grasp_ros.graph.parameters import FREE, PARAMETERS
 from grasp_ros.graph.ros import messages
@@ -22,6 +25,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.suggestion import allowed
 
 FILE = "--params-file"
+SIM_TIME = "use_sim_time"  # rclpy lets anybody set it at any time
 KINDS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}  # of parameters
 RCLError = rclpy_implementation.RCLError
 
@@ -37,6 +41,33 @@ class ParameterNode(Node):
             super().__init__(name, **options)
         if FILE in sys.argv and not self._parameter_overrides:  # the file may be for others, or the name is wrong
             self.get_logger().info(f"no parameter file has anything for {self.get_fully_qualified_name()}")
+
+    def create_service(self, kind: Any, name: str, callback: Callable[..., Any], **options: Any) -> Service:
+        """As rclpy's, but that a request which rclpy itself cannot read is answered."""
+        return super().create_service(kind, name, self._surviving(callback), **options)
+
+    def create_subscription(
+        self, kind: Any, topic: str, callback: Callable[..., Any], *qos: Any, **options: Any
+    ) -> Subscription:
+        """As rclpy's, but that a message which rclpy itself cannot read, a negative time on /clock, ends no node."""
+        return super().create_subscription(kind, topic, self._surviving(callback), *qos, **options)
+
+    def _surviving(self, callback: Callable[..., Any]) -> Callable[..., Any]:
+        """One of rclpy's own callbacks without its errors, which what anybody sends would let the executor raise."""
+        if not type(getattr(callback, "__self__", None)).__module__.startswith("rclpy."):
+            return callback
+
+        def survive(*words: Any) -> Any:  # a message, or a request and its response
+            try:
+                return callback(*words)
+            except ValueError as error:
+                self.get_logger().warning(f"ignored: {type(words[0]).__name__}: {error}", throttle_duration_sec=5.0)
+                if isinstance(words[0], SetParameters.Request):
+                    left = len(words[0].parameters) - len(words[1].results)
+                    words[1].results += [SetParametersResult(reason=str(error))] * left
+                return words[-1]
+
+        return survive
 
     def read_only(self, name: str) -> Any:
         """Declare one of PARAMETERS, which is set at start only, and return its value."""
@@ -106,7 +137,7 @@ class ParameterNode(Node):
             if declared.dynamic_typing and type(held) in (int, float) and type(parameter.value) in (int, str):
                 with suppress(ValueError):
                     parameter = RosParameter(name, value=float(parameter.value))
-            if declared.read_only:
+            if declared.read_only or name == SIM_TIME:
                 if _plain(parameter.value) == held:
                     continue
                 why = self.why_read_only if "." in name else ParameterNode.why_read_only
