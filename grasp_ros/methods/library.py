@@ -97,11 +97,13 @@ def solve(name: str, located: bool, problem: Problem) -> Solution:
         idle = 0 if at - t > TOGETHER * problem.duration else idle + 1
         t = at
         f = slopes(t, y, *args)
-        for gap in (first, *(gap for gap in active if gap.side != first.side and gap.fires_too(y, f))):
+        fired = [first, *(gap for gap in active if gap.side != first.side and gap.fires_too(y, f))]
+        for gap in fired:
             events.append((t, gap.side, kind_of(mode[gap.side], gap.after), *relative(y, gap.side)))
             mode[gap.side] = gap.after
-            for following in gaps[gap.side][gap.after]:
-                following.begin = t
+        f = slopes(t, y, q, mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT)
+        for following in (following for gap in fired for following in gaps[gap.side][gap.after]):
+            following.begin = t if following.rate(f) < 0.0 else math.nan
         status = Status.EVENT_BUDGET if len(events) > problem.max_events else None
     found = np.concatenate(states)  # as far as it came, at distinct times
     found[grid[: len(found)] == 0.0] = problem.system.state  # which LSODA interpolates
@@ -117,7 +119,7 @@ class _Gap:
         self.side, self.after, self.direction, self._work = side, after, direction, work
         self._front, self._back = (column + (p is not None) for column in PAIR_COLUMNS[side])
         self._offset = 0.0 if p is None else 1.0 / p
-        self.begin = math.nan  # time in s of an event of its pair, with which this gap became active
+        self.begin = math.nan  # time in s of an event of its pair, with which it became active and moves off
 
     def __call__(self, t: float, y: Array, *_: Any) -> float:
         """Its value in m or m/s.
@@ -128,13 +130,16 @@ class _Gap:
         value = float(y[self._front] - y[self._back] + self._offset)
         return -self.direction * TOGETHER if t == self.begin and value * self.direction >= 0.0 else value
 
+    def rate(self, f: Array) -> float:
+        """How fast it moves in its direction, for the slopes f of a state."""
+        return float(self.direction * (f[self._front] - f[self._back]))
+
     def fires_too(self, y: Array, f: Array) -> bool:
         """Whether it fires with another one: equal arms at rest reach the object at the same instant.
 
         scipy would lose it: a function that is zero, or a rounding past it, where a step begins is no event.
         """
-        moving = self.direction * (f[self._front] - f[self._back]) > 0.0
-        return bool(moving and abs(self(math.nan, y)) < TOGETHER)
+        return self.rate(f) > 0.0 and abs(self(math.nan, y)) < TOGETHER
 
 
 def _gaps(side: int, p: float, work: Any) -> dict[int, list[_Gap]]:

@@ -52,19 +52,33 @@ def test_condition_10_is_an_event_in_both_directions(name: str) -> None:
         assert motion.times(Transition.REENTRY, side) == pytest.approx([0.363159009501776], abs=tolerance)
 
 
-@pytest.mark.parametrize("name", STEPPING)
-def test_restitution_of_one_impact(name: str) -> None:
-    """O2: two bodies that are free; the exit speed depends on p v alone."""
-    law = impact(reduced_mass(1, 5), 1e4, "0.5", 1)
+def free_impact(name: str, p: str, seconds: float = 0.5) -> Trajectory:
+    """The left arm hits the object with 1 m/s after 0.1 s; nothing else acts."""
     settings = [f"{side}_{key}=0" for side in ("left", "right") for key in (
         "arm.stiffness_N_per_m", "arm.damping_Ns_per_m", "feedback.position_gain_N_per_m",
         "feedback.velocity_gain_Ns_per_m")]
     scene = horizon(
-        "case_01", 0.5, *settings, "left_arm.position_m=-0.1", "left_arm.velocity_m_per_s=1", "right_arm.position_m=9",
-        "left_contact.dissipation_s_per_m=0.5",
+        "case_01", seconds, *settings, "left_arm.position_m=-0.1", "left_arm.velocity_m_per_s=1",
+        "right_arm.position_m=9", f"left_contact.dissipation_s_per_m={p}",
     )
-    motion = simulate(scene, method=name, setting=PRECISE[METHODS[name].knob])
+    return simulate(scene, method=name, setting=PRECISE[METHODS[name].knob])
+
+
+@pytest.mark.parametrize("name", STEPPING)
+def test_restitution_of_one_impact(name: str) -> None:
+    """O2: two bodies that are free; the exit speed depends on p v alone."""
+    law, motion = impact(reduced_mass(1, 5), 1e4, "0.5", 1), free_impact(name, "0.5")
     assert motion.state[-1, 3] - motion.state[-1, 1] == pytest.approx(float(law.restitution), abs=1e-6)
+
+
+@pytest.mark.parametrize("name", LOCATING)
+def test_a_pair_that_leaves_along_the_clamp_surface_leaves_once(name: str) -> None:
+    """u' stays at -1/p to rounding: out of contact and back a hundred times at one instant is no motion."""
+    for p in ("30", "100", "300"):
+        motion = free_impact(name, p, 1.0)
+        assert motion.status is Status.DONE
+        assert len(motion.times(Transition.TOUCH, LEFT)) == 1
+        assert len(motion.event_table) <= 3  # a touch, perhaps a clamp, a release
 
 
 def test_jacobian_is_the_derivative_of_the_right_hand_side() -> None:
