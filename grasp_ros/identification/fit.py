@@ -9,7 +9,7 @@ import numpy as np
 
 from grasp_ros.identification.measured import FEWEST, Source, measured
 from grasp_ros.identification.numbers import acts, numbers_of
-from grasp_ros.identification.result import Against, Fit, identifiability_of, residual_table
+from grasp_ros.identification.result import CONFIDENCE, Against, Fit, identifiability_of, residual_table
 from grasp_ros.identification.search import FitProblem, first_noise, fitted, mean_square, refine, search
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import mapping, names, number, truth
@@ -17,6 +17,8 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import needing
 from grasp_ros.scene.places import check_scene
+
+FARTHEST = 1.0  # a factor of ten, in y, beyond which it has no end
 
 
 def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
@@ -76,12 +78,13 @@ def _result(problem: FitProblem, against: Mapping[str, float]) -> Fit:
     states, _, touches = problem.predict(y, rows)
     states[:, [place for place in range(6) if place not in data.channels]] = np.nan
     covariance, reach, unseen = identifiability_of(slopes, values, len(y))
+    below, above = _reaches(problem, reach, covariance, values)
     estimates = problem.values(y)
     found = np.array([*estimates.values()])
     scale, least = np.array([(number.width, number.least) for number in problem.numbers]).T
     return Fit(
         problem.scene_at(y), data.name, data.acting, tuple(estimates), found,
-        np.maximum(found - scale * reach, least), found + scale * reach, covariance * np.outer(scale, scale),
+        np.maximum(found - scale * below, least), found + scale * above, covariance * np.outer(scale, scale),
         tuple(tuple(problem.numbers[place].key for place in places) for places in unseen),
         data.t, data.state, states, np.where(np.isin(range(6), data.channels), problem.noise, np.nan),
         residual_table(values.reshape(rows, -1), data.t, touches),
@@ -93,10 +96,38 @@ def _test(problem: FitProblem, key: str, value: float, best: Array) -> Against:
     """F test of a value of one number: by how much the sum of squares grows where it is fixed."""
     from scipy import stats
 
-    numbers = tuple(number._replace(start=value, width=0.0, least=-np.inf) if number.key == key else number
-                    for number in problem.numbers)
-    fixed, rows, free = problem._replace(numbers=numbers), len(problem.data.t), len(best) - len(numbers)
-    least = min(mean_square(fixed, found) for found in (refine(fixed, np.zeros(len(numbers)), rows), search(fixed)))
-    variance = max(float(best @ best) / free, 1.0)
-    growth = max((least * len(best) - float(best @ best)) / variance, 0.0)
-    return Against(value, growth, float(stats.f.sf(growth, 1, free)))
+    fixed, begin, rows = problem.fixed(key, value), np.zeros(len(problem.numbers)), len(problem.data.t)
+    least = min(mean_square(fixed, found) for found in (refine(fixed, begin, rows), search(fixed)))
+    growth = _growth(least, problem, best)
+    return Against(value, growth, float(stats.f.sf(growth, 1, len(best) - len(problem.numbers))))
+
+
+def _growth(least: float, problem: FitProblem, best: Array) -> float:
+    """Growth of the sum of squares to a mean square, in variances."""
+    total = float(best @ best)
+    return max((least * len(best) - total) / max(total / (len(best) - len(problem.numbers)), 1.0), 0.0)
+
+
+def _reaches(problem: FitProblem, reach: Array, covariance: Array, best: Array) -> tuple[Array, Array]:
+    """How far intervals reach (n,) below and above: as the derivatives say, or farther, or without an end.
+
+    The sum of squares may be flat on one side: with more dry friction than holds an object, nothing changes any more.
+    At twice the reach it should have grown four times as far as at the end; where it has not by half of that, the reach
+    is doubled.
+    """
+    from scipy import stats
+
+    enough = 2.0 * stats.f.ppf(CONFIDENCE, 1, len(best) - len(problem.numbers))
+    below, above = reach.copy(), reach.copy()
+    for place, own in enumerate(problem.numbers):
+        others = np.nan_to_num(covariance[place] / covariance[place, place])  # go with it
+        for side, sign in ((below, -2.0), (above, 2.0)):
+            while side[place] < FARTHEST and own.at(y := sign * side[place]) > own.least:
+                fixed = problem.fixed(own.key, float(own.at(y)))
+                found = refine(fixed, others * y, len(problem.data.t))
+                if _growth(mean_square(fixed, found), problem, best) >= enough:
+                    break
+                side[place] *= 2.0
+                if side[place] >= FARTHEST:
+                    side[place] = np.inf
+    return below, above

@@ -61,7 +61,7 @@ class Fit(Frozen):
         What acted on the bodies: inputs of the data, or what the scene has in their place.
     keys : tuple of str
     estimates, low, high : arrays (n,)
-        With 95 % intervals; infinite, or from 0, for what is not identifiable.
+        With 95 % intervals; infinite, or from 0, for what is not identifiable, and on a side that the data do not show.
     covariance : array (n, n)
         In the units of the keys; NaN for what is not identifiable.
     not_identifiable : tuple of tuples of str

@@ -57,6 +57,12 @@ class FitProblem(NamedTuple):
         values = self.values(y).values()
         return self._replace(numbers=tuple(map(Number.linear_from, self.numbers, values)))
 
+    def fixed(self, key: str, value: float) -> FitProblem:
+        """The problem in which one of the numbers has a value."""
+        return self._replace(numbers=tuple(
+            number._replace(start=value, width=0.0, least=-np.inf) if number.key == key else number
+            for number in self.numbers))
+
     def scene_at(self, y: Array) -> Scene:
         """The scene with the free numbers; outside its domain it is refused."""
         free = zip(self.numbers, self.values(y).items(), strict=True)

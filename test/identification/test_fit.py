@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from grasp_ros import fit, load, read_bag, simulate
+from grasp_ros import compose, fit, load, read_bag, simulate
 from grasp_ros.graph.processes import Graph
 from grasp_ros.identification.measured import measured
 from grasp_ros.identification.result import whiteness
@@ -78,6 +78,28 @@ def test_intervals_hold_a_truth_that_is_zero_or_hardly_more(p: float) -> None:
         assert 0.0 <= found.low[1] <= p <= found.high[1] < 1e-3
         assert not found.against[P_LEFT].rejected
     assert not all(drawn)  # by the search, which begins elsewhere: half of the estimates are at 0, as noise has it
+
+
+@pytest.mark.slow
+def test_an_interval_has_no_end_where_the_data_show_only_a_bound() -> None:
+    """Above some 2.8 N of dry friction the object sticks, and nothing tells more of it from 8 N."""
+    friction = "object_friction.coulomb_N"
+    scene = compose("held", {
+        "time": {"duration_s": 2.0, "control_period_s": 0.005},
+        "left_arm": {"mass_kg": 1.0, "stiffness_N_per_m": 10.0, "damping_Ns_per_m": 0.5, "position_m": -0.05,
+                     "velocity_m_per_s": 0.0},
+        "object": {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0}, "object_friction": {"coulomb_N": 8.0},
+        "left_contact": {"hertz_N_per_m1_5": 1e3, "dissipation_s_per_m": 0.2},
+        "left_feedback": {"position_gain_N_per_m": 20.0, "velocity_gain_Ns_per_m": 2.0, "set_point_m": 0.02},
+    })
+    run, bounds = simulate(scene, sampled=True), 0
+    assert np.ptp(run.state[:, 2]) == 0.0
+    for seed in range(20):
+        found = fit(noisy(run, seed), [friction], scene.changed({friction: 2.0}))
+        if not found.not_identifiable:
+            bounds += 1
+            assert 2.7 < found.low[0] < found.estimates[0] < found.high[0] == np.inf
+    assert bounds > 5
 
 
 def test_data_without_noise_give_the_numbers_back(held: Trajectory, tmp_path: Path, command: Any) -> None:
