@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -77,8 +78,7 @@ def _table(problem: Any, found: Sequence[Any]) -> list[str]:
     units = problem.units
     if len(found) == 1:
         numbers = found[0].numbers
-        ends = {key for axis in problem.axes for key in axis.keys
-                if min(numbers[key] - axis.low, axis.high - numbers[key]) <= NEAR * (axis.high - axis.low)}
+        ends = {key for axis in problem.axes for key in axis.keys if _is_end(axis, numbers[key])}
         rows = [*((key, f"{value:.10g}{END if key in ends else ''}") for key, value in numbers.items()),
                 *((name, f"{value:.10g} {units[name]}") for name, value in found[0].outcomes.items()),
                 ("simulations", str(found[0].runs))]
@@ -88,3 +88,9 @@ def _table(problem: Any, found: Sequence[Any]) -> list[str]:
               *(f"{own.numbers[axis.keys[0]]:.8g}" for axis in problem.axes)] for own in found]
     widths = [max(map(len, column)) for column in zip(heads, *lines, strict=True)]
     return ["  ".join(f"{cell:>{width}}" for cell, width in zip(line, widths, strict=True)) for line in [heads, *lines]]
+
+
+def _is_end(axis: Any, value: float) -> bool:
+    """Whether a value is at an end of its range."""
+    low, at, high = map(math.log if axis.log else float, (axis.low, value, axis.high))
+    return min(at - low, high - at) <= NEAR * (high - low)

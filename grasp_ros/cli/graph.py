@@ -71,7 +71,7 @@ def add_to(commands: Any) -> None:
     _add_network(sub)
     sub = add_command(commands, "watch", _watch)
     sub.add_argument("bag", type=Path, nargs="?", help="a bag; default: the graph that runs")
-    sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="seconds of the bag in a second (default 1)")
+    sub.add_argument("--rate", type=float, metavar="R", help="seconds of the bag in a second (default 1)")
     sub.add_argument("--from", dest="first", type=float, metavar="S", help="time in the bag to begin at, in s")
     _add_namespace(sub, "of the graph")
     _add_network(sub)
@@ -141,7 +141,7 @@ def _run(options: argparse.Namespace) -> int:
             if first:
                 directory.parent.rmdir()
         raise
-    print("grasp: interrupted before the first tick", file=sys.stderr)
+    print(f"grasp: interrupted before the first tick; {directory} has the scene and the log", file=sys.stderr)
     return 130
 
 
@@ -242,8 +242,9 @@ def _replay(options: argparse.Namespace) -> int:
 
 def _watch(options: argparse.Namespace) -> int:
     if options.bag is None:
-        if options.first is not None:
-            raise Refused(f"--from {options.first!r} is not allowed; allowed: with a bag")
+        for option, value in (("--rate", options.rate), ("--from", options.first)):
+            if value is not None:
+                raise Refused(f"{option} {value!r} is not allowed; allowed: with a bag")
         _reach(options)
         become("watch", {}, options.namespace)
     if options.namespace != "/" or options.network:
@@ -251,7 +252,7 @@ def _watch(options: argparse.Namespace) -> int:
     from grasp_ros.cli.watch import play
     from grasp_ros.graph.bag.reading import read
 
-    play(read(options.bag), options.rate, options.first)
+    play(read(options.bag), 1.0 if options.rate is None else options.rate, options.first)
     return 0
 
 

@@ -6,6 +6,7 @@ import argparse
 import json
 import logging
 import math
+import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from grasp_ros.graph.stopping import stop_if_signalled
+from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import replacing
 
 if TYPE_CHECKING:
@@ -73,6 +75,8 @@ def destination(path: Path) -> Iterator[BinaryIO]:
             yield file
         note(f"written to {path}")
         return
+    if getattr(sys.stdout, "name", "") == os.devnull:  # it was closed, see `main.run`
+        raise Refused("-o -: the standard output is closed")
     sys.stdout.flush()
     yield sys.stdout.buffer
     sys.stdout.buffer.flush()

@@ -135,8 +135,8 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
         ("feedback", found["feedback"]),
         ("run", recording.running.words + (f", {resets} resets" if resets else "")),
         *_timing(found),
-        ("recorded", f"{found['duration_s']:g} s of {found['scene_duration_s']:g} s"
-                     + (f", in {resets + 1} runs of the scene" if resets else "")),
+        ("recorded", (f"{found['begin_s']:g} to " if found["begin_s"] else "") + f"{found['duration_s']:g} s of"
+                     f" {found['scene_duration_s']:g} s" + (f", in {resets + 1} runs of the scene" if resets else "")),
         ("messages", _messages(found["topics"])),
         ("contacts left, right", f"{left}, {right} seen at the ticks"),
         (f"V{of}", _ends(found["V_J"])), (f"V_c{of}", _ends(found["V_c_J"])),

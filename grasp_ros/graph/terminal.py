@@ -27,7 +27,9 @@ from grasp_ros.scene.effects.base import SIDES
 STYLES = {"left": "bold blue", "object": "bold white", "right": "bold red"}
 SIGNS = {"left": "[L]", "object": "(O)", "right": "[R]"}
 WIDEST, NARROW, LEAST = 80, 66, 40  # columns of the picture: at most, below which words are short, and at least
-CONTACT = {Mode.NONE: "none", Mode.LEFT: "left", Mode.RIGHT: "right", Mode.BOTH: "left and right"}
+CONTACT: dict[float, str] = {Mode.NONE: "none", Mode.LEFT: "left", Mode.RIGHT: "right", Mode.BOTH: "left and right"}
+BALANCE: dict[float, Text | str] = {0.0: "closes", 1.0: Text("ALARM", style="bold red")}
+UNKNOWN = "not known"
 _KEY = re.compile(rb"\x1b[\[O][CD]| |q")
 _BEGUN = re.compile(rb"\x1b[\[O]?$")  # of an arrow key whose end has not come yet
 KEY_BYTES = 1024  # taken at once
@@ -107,11 +109,12 @@ class View:
         table = Table(box=None, padding=(0, 1 if width < NARROW else 2), show_header=False, pad_edge=width >= NARROW)
         for name in names:
             value = level[name]
-            self._most = max(self._most, value)
-            filled = round(bar * max(value, 0.0) / self._most) if self._most else 0
+            finite = bool(np.isfinite(value))  # what a bag says need not be
+            self._most = max(self._most, value) if finite else self._most
+            filled = round(bar * (max(value, 0.0) / self._most)) if finite and self._most else 0
             table.add_row(name, f"{value:.6g} J", Text("█" * filled, style="green" if closed else "yellow"))
-        table.add_row("contact", CONTACT[Mode(int(level["mode"]))], "")
-        table.add_row("balance", Text("ALARM", style="bold red") if level["alarm"] == 1.0 else "closes", "")
+        table.add_row("contact", CONTACT.get(level["mode"], UNKNOWN), "")
+        table.add_row("balance", BALANCE.get(level["alarm"], UNKNOWN), "")
         return [table] if closed else [table, "V: no law is announced, or another one ran"]
 
 

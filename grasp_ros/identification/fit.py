@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from grasp_ros.identification.measured import FEWEST, Source, measured
-from grasp_ros.identification.numbers import acts, numbers_of
+from grasp_ros.identification.numbers import OFFSET, acts, numbers_of
 from grasp_ros.identification.result import CONFIDENCE, Against, Fit, identifiability_of, residual_table
 from grasp_ros.identification.search import FitProblem, first_noise, fitted, mean_square, refine, search
 from grasp_ros.physics.errors import Refused
@@ -17,6 +17,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import needing
 from grasp_ros.scene.places import check_scene
+from grasp_ros.sensitivity.directions import check_keys
 
 FARTHEST = 1.0  # a factor of ten, in y, beyond which it has no end
 
@@ -61,9 +62,10 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
     if found.inputs is None and found.why_unknown:
         raise Refused(f"{found.name}: {found.why_unknown}; allowed: inputs at every tick, and no free number of"
                       " controllers or external forces")
-    for key in against:
-        if key not in free or key.startswith("offset."):
+    for key, value in against.items():
+        if key not in free or key.startswith(OFFSET):
             raise Refused(f"against: {key}: allowed: a number of the scene that is free")
+        check_keys(found.scene.changed({key: value}), [key], found.sampled)
     samples = len(found.t) * len(found.channels)
     if samples < len(numbers) + FEWEST:
         raise Refused(f"{found.name}: {samples} measured numbers; allowed for {len(numbers)} free ones: at least"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable
 from contextlib import closing, nullcontext
 from pathlib import Path
@@ -31,7 +32,8 @@ def run(
         return compute(plan.variants(*span), plan.setup, stop)
 
     check(plan)
-    path, rows, told = Path(path), chunk_rows(plan.scene, plan.setup), progress or (lambda _: None)
+    path, told = Path(path), progress or (lambda _: None)
+    rows = 1 if path.exists() else chunk_rows(plan.scene, plan.setup, _seconds(plan))
     if path.exists() and not Store(path, plan, rows).spans:  # it is done, and needs no cluster
         told(plan.rows)
         return
@@ -46,3 +48,14 @@ def run(
                 store.write(span, chunk)
                 done += span[1] - span[0]
                 told(done)
+
+
+def _seconds(plan: Plan) -> float:
+    """Longest wall time of three rows: how far one goes on until it has settled, nobody knows before."""
+    compute(plan.variants(0, 1), plan.setup)  # to compile or load what it takes
+    spent = []
+    for row in (0, plan.rows // 2, plan.rows - 1):
+        begin = time.monotonic()
+        compute(plan.variants(row, row + 1), plan.setup)
+        spent.append(time.monotonic() - begin)
+    return max(spent)

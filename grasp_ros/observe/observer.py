@@ -218,13 +218,17 @@ class RunObserver:
 
 
 def settle(integrator: Integrator, run_observer: RunObserver, stretch: float, horizons: int) -> None:
-    """Go on with a watched run that is over, in stretches of s, until V_c decides whether it has settled."""
+    """Go on with a watched run that is over, in stretches of s, until V_c decides whether it has settled.
+
+    A run that does not get there, by its budget say, is not known to: nan.
+    """
     run_observer.memory.switches[: Switch.CERTAIN] = Wanted.SETTLING, 0
     seen, done = run_observer.seen, 1
     while seen[Seen.SETTLED] == UNDECIDED and done < horizons:
         integrator.advance(stretch, start=done * stretch)
         if integrator.status is not Status.DONE:
-            break
+            seen[Seen.SETTLED] = np.nan
+            return
         run_observer.finish()
         done += 1
     if seen[Seen.SETTLED] == UNDECIDED:

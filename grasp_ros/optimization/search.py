@@ -132,9 +132,12 @@ def search(problem: DesignProblem, seed: int = 0, progress: Told | None = None) 
     place, least = places[int(np.argmin(reached))], float(reached.min())
     if least >= BROKEN:
         wish = " and ".join(f"{bound.outcome} <= {bound.most:g}" for bound in problem.bounds)
-        stops = problem.found(problem.numbers(place[None])).stops
+        nearest = problem.found(problem.numbers(place[None]))
+        shown = ", ".join(f"{name} {values[0]:.6g}" for name, values in nearest.outcomes.items())
+        finite = all(np.isfinite(values[0]) for values in nearest.outcomes.values())
+        why = f"; the nearest has {shown}" if finite else problem.why_unsettled()
         raise Refused(f"{problem.scene.name}: none of {runs} choices has a finite {problem.minimise[0]}"
-                      + (f" with {wish}" if wish else "") + (f"; {stops[0]}" if stops else problem.why_unsettled()))
+                      + (f" with {wish}" if wish else "") + (f"; {nearest.stops[0]}" if nearest.stops else why))
     if worst - least <= AGREE * abs(least):
         raise Refused(f"{problem.scene.name}: nothing to choose: {problem.minimise[0]} is {least:.10g} for all of"
                       f" {runs} choices; allowed: numbers and ranges that change it")

@@ -113,9 +113,9 @@ def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER, i
     for i in left.tolist():
         if stop[0]:
             break
-        run = _run(variants.row(i), setup, columns, runs, i, move)
-        if run.status is not Status.DONE:
-            status[i], stops[i] = STATUSES.index(run.status.name), run.stop
+        ended, stopped = _run(variants.row(i), setup, columns, runs, i, move)
+        if ended is not Status.DONE:
+            status[i], stops[i] = STATUSES.index(ended.name), stopped
     system = variants.scene.system
     runs.state[:, system.absent_columns] = np.nan
     runs.seen[:, [*(first + body for first in (Seen.OUTSIDE, Seen.LAST_OUTSIDE) for body in system.absent),
@@ -148,8 +148,9 @@ def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, whi
     return np.asarray(which[~done])
 
 
-def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome], runs: Runs, i: int, move: Drive) -> Integrator:
-    """One row, driven as `simulate` drives it, or by other commands."""
+def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome], runs: Runs, i: int, move: Drive
+         ) -> tuple[Status, str]:
+    """One row, driven as `simulate` drives it, or by other commands; how it ended at its horizon, and why."""
     system, sampled = scene.system, setup.sampled or scene.sampled
     run = Integrator(
         system, continuous=not sampled, accuracy=setup.accuracy, max_events=setup.max_events, max_work=setup.max_work)
@@ -158,7 +159,7 @@ def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome], runs: Runs, i: 
     move(scene, run, sampled, NO_GRID)
     touched = run.event_table[run.event_table[:, Entry.KIND] == Transition.TOUCH, Entry.BODY]
     runs.state[i], runs.touches[i] = run.state, [(touched == side).sum() for side in (LEFT, RIGHT)]
-    done = run.status is Status.DONE
+    ended, done = (run.status, run.stop), run.status is Status.DONE
     if done and any(column.name == LYAPUNOV for column in columns):
         from grasp_ros.sensitivity.spectrum import spectrum  # whose kernels no other run loads
 
@@ -169,4 +170,4 @@ def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome], runs: Runs, i: 
         if done and wanted & Wanted.SETTLING:
             settle(run, run_observer, scene.duration, setup.horizons)
         runs.seen[i] = run_observer.seen
-    return run
+    return ended

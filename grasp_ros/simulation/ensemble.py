@@ -179,10 +179,10 @@ def ensemble(
     return Table(scene, setup, variants.changes, found, status, stops)
 
 
-def chunk_rows(scene: Scene, setup: Setup) -> int:
-    """Rows of one chunk, for about `CHUNK_S` of work."""
+def chunk_rows(scene: Scene, setup: Setup, seconds: float = 0.0) -> int:
+    """Rows of one chunk, for about `CHUNK_S` of work; some have taken so many seconds, if that is known."""
     ticks = scene.ticks if has_inputs(scene, setup) else 1
-    return max(1, int(CHUNK_S / (ROW_S + ticks * TICK_S)))
+    return max(1, int(CHUNK_S / max(ROW_S + ticks * TICK_S, seconds)))
 
 
 def chunks(rows: int, size: int) -> list[tuple[int, int]]:

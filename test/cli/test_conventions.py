@@ -146,6 +146,11 @@ def test_a_closed_output_is_no_traceback(program: str) -> None:
     assert "Exception" not in result.stderr
 
 
+def test_a_table_into_a_closed_output_is_not_lost_in_silence() -> None:
+    found = shell("$GRASP new - >&-")
+    assert (found.returncode, found.stderr) == (2, "grasp: -o -: the standard output is closed\n")
+
+
 @pytest.mark.parametrize("words", ["--help", "simulate --help", "scenes", "new - -q"])
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 def test_an_output_that_cannot_be_written_is_no_success(words: str, unbuffered: str) -> None:

@@ -150,6 +150,8 @@ def changed(topic: Topic, cdr: bytes, path: str, value: Any) -> bytes:
         (JOINT_STATES, "position.1", np.nan, "tick 5: a number is not finite"),
         (JOINT_STATES, "effort.2", np.inf, "tick 5: a number is not finite"),
         (LEFT_COMMAND, "wrench.force.x", np.nan, "tick 5: a number is not finite"),
+        (JOINT_STATES, "velocity.0", 1e200, "tick 5: a number is not finite, or beyond 1e\\+100"),
+        (JOINT_STATES, "name.1", "left", "left, left, right; allowed: three numbers of left, object, right"),
         (JOINT_STATES, "effort.1", 99.0, "tick 5: an effort of the object; allowed: 0"),
         (JOINT_STATES, "header.stamp.nanosec", 7, "tick 5: its stamp is not the next one of the scene"),
         (LEFT_COMMAND, "header.stamp.nanosec", 4_000_000, "tick 5: its stamp is not that of the state"),
@@ -188,6 +190,18 @@ def test_every_number_of_the_monitor_is_verified(tmp_path: Path, name: str, valu
     assert not found.holds
     assert (found.difference.tick, found.difference.topic) == (40, "lyapunov")
     assert found.difference.name == ("V" if name == "closed" else name)  # V is not there where it is not closed
+
+
+@pytest.mark.parametrize("name", ["alarm", "work"])
+def test_a_balance_that_nobody_knows_does_not_close(tmp_path: Path, name: str) -> None:
+    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
+    ticks, path = [], f"position.{LYAPUNOV_NAMES.index(name)}"
+    for time_ns, rows in study.ticks_of(run):
+        there = dict(rows)
+        ticks.append((time_ns, [*{**there, LYAPUNOV: changed(LYAPUNOV, there[LYAPUNOV], path, np.nan)}.items()]))
+    found = summary(bag.read(written(tmp_path / "bag", run.scene, ticks)))
+    assert found["balanced_ticks"] == 0
+    assert np.isnan(found["work_J"])
 
 
 def test_a_topic_with_another_scene_than_that_of_the_bag_is_refused(tmp_path: Path) -> None:

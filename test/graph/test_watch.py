@@ -208,6 +208,18 @@ def test_the_picture_is_whole_at_every_width(path: Path, width: int) -> None:
         assert all(word in picture for word in words)
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e308, 9.0])
+@pytest.mark.parametrize("name", ["V", "V_c", "mode", "alarm", "closed"])
+def test_whatever_a_bag_says_of_the_energy_is_shown(path: Path, name: str, value: float) -> None:
+    """Numbers of the monitor need not be finite; `grasp verify` says which are wrong."""
+    recording, console = bag.read(path), Console(width=80, file=io.StringIO(), color_system=None)
+    view, moment = View(recording.scene), moment_of(recording, 1, "paused")
+    for level in ({**moment.level, name: value}, moment.level):
+        console.print(view.draw(moment._replace(level=level), 80))
+    shown = console.file.getvalue()  # type: ignore[attr-defined]
+    assert ("not known" in shown) is (name in ("mode", "alarm"))
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [(["--from", "2.5"], "--from: 2.5 is not allowed; allowed: 0 to 2 s"),
@@ -217,7 +229,8 @@ def test_the_picture_is_whole_at_every_width(path: Path, width: int) -> None:
 def test_what_cannot_be_shown_is_refused(path: Path, command: Any, options: list[str], words: str) -> None:
     found = command("watch", str(path), *options)
     assert (found.returncode, found.stderr) == (2, f"grasp: {words}\n")
-    assert command("watch", "--from", "1").stderr == "grasp: --from 1.0 is not allowed; allowed: with a bag\n"
+    for option in ("--from", "--rate"):
+        assert command("watch", option, "1").stderr == f"grasp: {option} 1.0 is not allowed; allowed: with a bag\n"
     assert command("watch", "bag", "--namespace", "/x").stderr.endswith("of a graph; allowed: without a bag\n")
 
 

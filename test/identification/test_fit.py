@@ -275,6 +275,8 @@ HELD = "".join(f"{line},{'input_left_N,input_object_N,input_right_N' if line[0] 
      "column 'x_objekt_m': not known; did you mean x_object_m?"),
     (ROWS.replace("-0.298,", "1_0.0,"), ("--scene", "case_01", "--free", P_LEFT), "line 4: could not convert"),
     (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", f"{P_LEFT}=1_0"), "allowed: KEY=VALUE, with a number"),
+    (ROWS, ("--scene", "friction", "--free", "object_friction.coulomb_N", "--against", "object_friction.coulomb_N=0"),
+     "object_friction.coulomb_N has no derivative at 0"),
     (re.sub(r"-0\.\d+", "0", ROWS), ("--scene", "case_01", "--free", P_LEFT), "positions do not change; allowed: a"),
     (ROWS, ("--scene", "arm_alone", "--free", "left_arm.mass_kg"), "x_object_m: arm_alone has no such body"),
     (HELD, ("--scene", "case_01", "--set", "loop={}", "--free", P_LEFT), "not the ticks of case_01, every 0.001 s"),
@@ -283,7 +285,7 @@ HELD = "".join(f"{line},{'input_left_N,input_object_N,input_right_N' if line[0] 
     ("# mine\n" + ROWS, ("--scene", "case_01", "--free", P_LEFT), "line 1: # mine; allowed: t_s and at least one of"),
     (re.sub("0$", "0,ok", ROWS.replace("object_m", "object_m,why"), flags=re.MULTILINE),
      ("--scene", "case_01", "--free", P_LEFT), "column 'why': not known"),
-], ids=range(29))
+], ids=range(30))
 def test_refusals(tmp_path: Path, command: Any, content: str, words: tuple[str, ...], complaint: str) -> None:
     (tmp_path / "data.csv").write_text(content)
     result = command("fit", "data.csv", *words)

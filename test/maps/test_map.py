@@ -93,6 +93,15 @@ def test_a_sample_does_not_depend_on_chunks(tmp_path: Path, monkeypatch: pytest.
     assert len(set(values)) == 20
 
 
+def test_chunks_of_slow_rows_are_small(tmp_path: Path) -> None:
+    """How long a row takes is measured: a map that is killed again and again gets on."""
+    for name, seconds in (("fast", 0.5), ("slow", 2000.0)):
+        scene = scenes.load("case_02", [f"time.duration_s={seconds}"])
+        run(Plan(scene, Setup(("touches",)), (Axis(GAIN, 5.0, 6.0, 16),)), tmp_path / name)
+    assert open_group(tmp_path / "fast")[STATUS].chunks[0] >= 16
+    assert open_group(tmp_path / "slow")[STATUS].chunks[0] < 16
+
+
 def kill(plan: Plan, path: Path, when: Callable[[], bool]) -> None:
     """Begin a map in a process of its own, and kill it."""
     code = (

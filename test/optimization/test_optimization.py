@@ -83,7 +83,8 @@ def test_no_choice_along_two_outcomes_is_better_in_both(monkeypatch: pytest.Monk
     ({BOTH_KV: (1.0, 2.0)}, "beauty", {}, "outcome beauty: not known"),
     ({BOTH_KV: (1.0, 2.0)}, "extremes", {}, "has several units; allowed: one of x_left_min"),
     ({BOTH_KV: (1.0, 2.0)}, "settling_time", {"beauty": 1.0}, "outcome beauty: not known"),
-    ({BOTH_KV: (1.0, 2.0)}, "settling_time", {"peak_input": 1e-3}, "none of .* with peak_input <= 0.001"),
+    ({BOTH_KV: (1.0, 2.0)}, "settling_time", {"peak_input": 1e-3},
+     r"none of .* with peak_input <= 0.001; the nearest has settling_time [\d.]+, peak_input 2\.5$"),
     ({"right_contact.dissipation_s_per_m": (0.1, 0.2)}, "peak_input_left", {}, r"nothing to choose: .* 1\.5 for all"),
     ({}, "settling_time", {}, "axes: none"),
     ({BOTH_KV: (2.0, 1.0)}, "settling_time", {}, "2.0 to 1.0 is not .* allowed: low < high"),
@@ -130,3 +131,7 @@ def test_the_command_writes_a_scene_and_figures(command: Any, tmp_path: Path) ->
     assert "at an end" not in result.stdout
     end = command("design", "case_01", "--free", f"{BOTH_KV}=1:3", "--minimise", "peak_impact")
     assert "an end of its range" in end.stdout
+    wide = "left_contact.dissipation_s_per_m=1e-3:1e7::log", "--minimise", "peak_impact_left"
+    inside = command("design", "case_01", "--set", "time.duration_s=3", "--free", *wide)  # at 1.2
+    assert inside.returncode == 0, inside.stderr
+    assert "an end of its range" not in inside.stdout

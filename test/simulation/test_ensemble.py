@@ -85,6 +85,18 @@ def test_a_row_that_is_refused_or_stops_takes_nobody_with_it() -> None:
 
 
 @pytest.mark.slow
+def test_a_budget_that_ends_behind_the_horizon_leaves_what_is_known() -> None:
+    """Only whether the row settles is not, for which it goes on."""
+    wanted, scene = ("settling_time", "touches"), scenes.load("case_03")
+    found = ensemble(scene, {}, wanted, setup=Setup(max_events=100))
+    assert found.done.all()
+    assert not found.stops
+    assert np.isnan(found.columns["settling_time"]).all()
+    assert found.columns["touches_left"] == ensemble(scene, {}, wanted).columns["touches_left"]
+    early = ensemble(scene, {}, wanted, setup=Setup(max_events=10))
+    assert "before the end of the horizon: t = 2.3" in early.stops[0]
+
+
 def test_arrays_are_built_and_refused_like_scenes() -> None:
     """Every key that has a place in the arrays: the same system, to the last bit, and the same rows refused."""
     scene = scenes.load("case_01", [

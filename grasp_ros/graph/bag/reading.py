@@ -5,14 +5,12 @@
 
 from __future__ import annotations
 
-import math
 import os
 from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +47,8 @@ from grasp_ros.scene.topics import (
 
 __all__ = ["BagError", "Recording", "read"]
 MOST_NS = 2**63 - 1
-NOT_FINITE, PUSHED = "a number is not finite", "an effort of the object; allowed: 0"
+LARGEST = 1e100  # of a number: its square is one, too
+NOT_FINITE, PUSHED = f"a number is not finite, or beyond {LARGEST:g}", "an effort of the object; allowed: 0"
 NOT_NEXT = "its stamp is not the next one of the scene"
 
 
@@ -91,7 +90,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
 def _take_command(forces: array[float], column: Columns, stored: Stored) -> None:
     """Take a command of a free run, which belongs to no tick."""
     force = column.numbers(stored.cdr)[-1]
-    if not math.isfinite(force):
+    if not abs(force) <= LARGEST:
         raise BagError(f"{stored.topic}: {NOT_FINITE}")
     forces.append(force)
 
@@ -125,7 +124,7 @@ def stamp_of(columns: Mapping[Topic, Columns], tick: Mapping[Topic, bytes]) -> i
         If they are not such as `read` takes.
     """
     rows = {topic: columns[topic].numbers(cdr) for topic, cdr in tick.items() if topic in columns}
-    if not all(map(math.isfinite, chain(*(row for topic, row in rows.items() if topic != LYAPUNOV)))):
+    if not all(abs(number) <= LARGEST for topic, row in rows.items() if topic != LYAPUNOV for number in row):
         raise BagError(NOT_FINITE)
     if columns[JOINT_STATES].efforts_of_object(np.array([rows[JOINT_STATES]])).any():
         raise BagError(PUSHED)
@@ -210,7 +209,8 @@ class Columns:
         numbers = self._along_x(message.wrench) if self._topic.type == FORCE else message.position
         if self._topic == JOINT_STATES:
             lists = message.position, message.velocity, message.effort
-            if any(len(values) != len(message.name) for values in lists) or not {*names} <= {*message.name}:
+            once = len({*message.name}) == len(message.name)
+            if not (once and {*names} <= {*message.name} and all(len(row) == len(message.name) for row in lists)):
                 raise BagError(f"{self._name}: {', '.join(message.name)}; allowed: three numbers of {', '.join(names)}")
             numbers = np.array(lists)[:, [message.name.index(name) for name in names]].ravel()
         if len(numbers) != self._template.count:
@@ -252,7 +252,7 @@ class Columns:
             self.refuse(ticks, ~(known & follows(step, passed, self._period_ns)), NOT_NEXT)
             self.refuse(ticks, self.efforts_of_object(rows).any(axis=1), PUSHED)
         if self._topic != LYAPUNOV:
-            self.refuse(ticks, ~np.isfinite(rows).all(axis=1), NOT_FINITE)
+            self.refuse(ticks, ~(np.abs(rows) <= LARGEST).all(axis=1), NOT_FINITE)
         return ticks, rows[:, 2:], stamps
 
 

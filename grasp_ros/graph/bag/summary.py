@@ -25,7 +25,8 @@ def summary(recording: Recording) -> dict[str, Any]:
         "bag": str(recording.path), "size_bytes": recording.size, "title": scene.title, "watch": scene.watch,
         "warnings": list(scene.warnings), "feedback": scene.feedback_in_words(sampled=True),
         "lockstep": running.lockstep, "accuracy": running.accuracy, "resets": max(len(recording.starts) - 1, 0),
-        "ticks": len(recording.tick), "duration_s": float(recording.t[-1]), "scene_duration_s": scene.duration,
+        "ticks": len(recording.tick), "begin_s": float(recording.t[0]), "duration_s": float(recording.t[-1]),
+        "scene_duration_s": scene.duration,
         "topics": {name: {"messages": count, "rate_Hz": rates[name]} for name, count in recording.counts.items()
                    if count},
         "missing": {name: count for name, count in recording.missing.items() if count},
@@ -49,8 +50,8 @@ def summary(recording: Recording) -> dict[str, Any]:
 
 def _levels(recording: Recording) -> dict[str, Any]:
     """Contacts, energies and their balance; the work is NaN where the monitor's numbers are not whole."""
-    work, level = recording.lyapunov[:, LYAPUNOV_NAMES.index("work")], recording.energy
-    balanced = int(np.count_nonzero(~np.isnan(work)))
+    work, alarm = (recording.lyapunov[:, LYAPUNOV_NAMES.index(name)] for name in ("work", "alarm"))
+    balanced, level = int(np.count_nonzero(~np.isnan(work + alarm))), recording.energy
     whole = balanced == recording.tick[-1] + 1
     return {
         "contacts": {side: _beginnings(recording, level.mode, flag)
