@@ -23,7 +23,7 @@ from importlib import import_module
 from grasp_ros.cli.commands import COMMANDS, overview
 from grasp_ros.cli.parser import Command, Parser, add_levels, shortened
 from grasp_ros.graph.bag.disk import FULL
-from grasp_ros.graph.stopping import on_signals, raise_on_signals, stop_if_signalled
+from grasp_ros.graph.stopping import is_signalled, on_signals, raise_on_signals, stop_if_signalled
 from grasp_ros.physics.errors import Refused, described
 
 HELP = f"""\
@@ -110,6 +110,9 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
         print(f"grasp: interrupted{stop}", file=sys.stderr)
         return 130
     except Exception as error:
+        if is_signalled():
+            print("grasp: interrupted", file=sys.stderr)
+            return 130
         if not hasattr(error, "__notes__"):  # which an error of a user's controller has
             raise
         print(shortened(f"grasp: {error.__notes__[0]}: {described(error)}"), file=sys.stderr)

@@ -96,9 +96,14 @@ def _interrupt(number: int, _: object) -> None:
     raise KeyboardInterrupt
 
 
+def is_signalled() -> bool:
+    """Whether a signal came: what is raised afterwards may be what others, an import of numpy say, have made of it."""
+    return bool(_raised)
+
+
 def stop_if_signalled() -> None:
     """Raise the KeyboardInterrupt of a signal that came, if it has been dropped; before results are written, say."""
-    if _raised:
+    if is_signalled():
         raise KeyboardInterrupt
 
 

@@ -7,6 +7,8 @@ is written once, because it is written here.
 from __future__ import annotations
 
 import json
+import logging
+import signal
 from collections.abc import Generator, Iterable
 from functools import cache
 from itertools import islice
@@ -39,7 +41,12 @@ def connect(workers: int, scheduler: str) -> Any:
     with needing("a cluster", "cluster"):
         from distributed import Client
     if not scheduler:
-        return Client(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None)
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])  # a Ctrl-C is for us: workers end with us
+        try:
+            options = {"dashboard_address": None, "silence_logs": logging.CRITICAL}  # workers that end are no error
+            return Client(n_workers=workers, threads_per_worker=1, **options)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
     try:
         return Client(scheduler, timeout=TIMEOUT_S)
     except (OSError, ValueError) as error:

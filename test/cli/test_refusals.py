@@ -130,7 +130,7 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("run case_01 --accuracy 2", "accuracy: 2.0"),
         ("ctl --namespace lab status", "'lab' is not allowed; allowed: / and names of ROS such as /lab/one"),
         ("watch --namespace /1a", "'/1a' is not allowed"),
-        ("inspect nothing", "nothing: not a bag of this package"),
+        ("inspect nothing", "nothing: cannot be read: No such file or directory"),
         ("inspect file", "file: not a bag of this package"),
         ("inspect bag", "bag: not a bag of this package"),
         (f"plot {LONG}", "cannot be read: File name too long"),

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from processes import DEADLINE, GRASP, START, children, growing, wait_for
+from processes import DEADLINE, GRASP, START, children, growing, ran, wait_for
 
 from grasp_ros.graph import bag, shared_memory
 from grasp_ros.scene.topics import JOINT_STATES
@@ -108,3 +108,24 @@ def test_a_long_command_ends_cleanly_on_a_signal(launch: Any, tmp_path: Path, nu
     assert command.returncode == 130
     assert err.splitlines()[-1] == "grasp: interrupted"
     assert not list(tmp_path.iterdir())
+
+
+IMPORTING = """
+import os, signal, time
+from grasp_ros.cli.main import run
+
+def parser():
+    try:
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(60.0)
+    except KeyboardInterrupt:
+        raise ImportError("of numpy") from None
+
+raise SystemExit(run(parser, []))
+"""
+
+
+def test_a_signal_of_which_an_import_has_made_another_error_is_an_interrupt() -> None:
+    """As that of numpy's extensions does it, whose advice on broken installations was shown."""
+    found = ran(sys.executable, "-c", IMPORTING)
+    assert (found.returncode, found.stderr) == (130, "grasp: interrupted\n")

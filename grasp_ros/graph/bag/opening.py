@@ -17,7 +17,7 @@ from grasp_ros.graph.bag.recorder import OWN_RECORD, VERSION
 from grasp_ros.graph.bag.rosbag2 import TOPIC, decode, names_of, topics_of
 from grasp_ros.graph.bag.storage import CONVERT, Storage, Stored
 from grasp_ros.physics import given
-from grasp_ros.scene.files import DAMAGE, decoding
+from grasp_ros.scene.files import DAMAGE, decoding, reading
 from grasp_ros.scene.topics import DIAGNOSTICS, RUN, SCENE, Topic
 
 KIND = "a bag of this package"
@@ -34,7 +34,7 @@ def decoding_bag(path: Path) -> AbstractContextManager[None]:
 
 def open_storage(path: Path, salvage: bool = False) -> Storage:
     """The storage file of a bag, or of a directory that holds one."""
-    with decoding_bag(path):
+    with decoding_bag(path), reading(path, BagError):
         files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
         if files and files[0].is_fifo():
             raise BagError(f"{path}: not {KIND}: a pipe; allowed: a file")
