@@ -17,6 +17,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompileResult
 from numba.core.datamodel import default_manager
 from numba.core.registry import CPUDispatcher, cpu_target
+from numba.core.types import BaseFunction
 
 from grasp_ros.exact.compilation import jit, kernel_cache
 
@@ -126,8 +127,8 @@ def test_processes_that_write_at_once_leave_whole_files(tmp_path: Path) -> None:
     ("owner", "name"),
     [
         (JITCodeLibrary, "_finalize_final_module"), (JITCodeLibrary, "_optimize_final_module"),
-        (CPUDispatcher, "compile"), (NullCache, "load_overload"), (NullCache, "save_overload"),
-        (CompileResult, "_rebuild"), (CompileResult, "_reduce"),
+        (CPUDispatcher, "compile"), (BaseFunction, "get_call_type"), (NullCache, "load_overload"),
+        (NullCache, "save_overload"), (CompileResult, "_rebuild"), (CompileResult, "_reduce"),
         (cpu_target.target_context.codegen(), "_library_class"), (cpu_target.target_context.codegen(), "magic_tuple"),
         (cpu_target.target_context.codegen(), "set_env"),
         (numba.njit(twice), "_cache"), (numba.njit(twice), "targetctx"), (numba.njit(twice), "targetoptions"),

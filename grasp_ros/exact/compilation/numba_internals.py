@@ -18,6 +18,7 @@ from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.serialize import dumps
+from numba.core.types import BaseFunction
 
 from grasp_ros.exact.compilation.kernel_cache import (
     cache_directory,
@@ -63,15 +64,32 @@ class Kernel(CPUDispatcher):
 
 @contextmanager
 def _parts(dispatcher: CPUDispatcher) -> Iterator[None]:
-    """What this thread compiles meanwhile are parts; it must have numba's lock."""
-    own = vars(dispatcher.targetctx.codegen())
+    """What this thread compiles meanwhile are parts, and what it has typed once is known; it must have numba's lock."""
+    own, before_typing = vars(dispatcher.targetctx.codegen()), _FUNCTION.get_call_type
     before = own.copy()
     own.update(_library_class=Part, set_env=_no_environment)
+    _FUNCTION.get_call_type = _call_type
     try:
         yield
     finally:
+        _FUNCTION.get_call_type = before_typing
         own.clear()
         own.update(before)
+
+
+_FUNCTION: Any = BaseFunction
+_ask, _known = BaseFunction.get_call_type, dict[Any, Any]()
+
+
+def _call_type(function: BaseFunction, context: Any, arguments: Any, named: Any) -> Any:
+    """Signature of a call of one of numba's functions, for some types of arguments.
+
+    numba tries a dozen definitions for each product, and remembers nothing: an eighth of the time of compiling.
+    """
+    key = function, arguments, tuple(named.items())
+    if key not in _known:
+        _known[key] = _ask(function, context, arguments, named)
+    return _known[key]
 
 
 def _no_environment(*_: object) -> None:
