@@ -65,10 +65,12 @@ def simulated(name: str, scene: Scene, setting: float) -> Solve:
     """A method of `grasp simulate` as a contender builds it."""
     def solve(grid: Array) -> Answer:
         run = simulate(scene, grid=grid, method=name, setting=setting)
-        left, right = (len(run.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))
+        touches = None
+        if METHODS[name].events:
+            touches = len(run.times(Transition.TOUCH, LEFT)), len(run.times(Transition.TOUCH, RIGHT))
         counts = run.counters
         steps = sum(counts.get(counter, 0) for counter in ("steps", "flights", "contact steps"))
-        return Answer(run.state, (left, right) if METHODS[name].events else None,
+        return Answer(run.state, touches,
                       DONE if run.status is Status.DONE else run.status.value, steps, counts.get("right hand sides"))
 
     return solve

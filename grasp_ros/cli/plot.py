@@ -16,7 +16,7 @@ from grasp_ros.cli.output import STDOUT, figure_endings, note, write_figure
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.system import COLUMN, NAMES
-from grasp_ros.scene.files import reading
+from grasp_ros.scene.files import YAML, reading
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, plots, simulate
 from grasp_ros.simulation.animation import FORMATS, animate
 from grasp_ros.simulation.canvas import Axes
@@ -100,6 +100,8 @@ def _motion(source: str, options: argparse.Namespace, span: Span) -> Motion:
         raise Refused(f"{source}: --set, --sampled, --method, --step, --sensitivity are not allowed; allowed for"
                       " scenes")
     if not recorded:
+        if path.is_file() and ending not in YAML:
+            raise Refused(f"{source}: no such scene; allowed: a scene, a bag, or a .npz file of `grasp simulate`")
         return _simulated(source, options, span)
     motion: Motion = load(path) if ending == ".npz" else read(path)
     warn(motion.scene)

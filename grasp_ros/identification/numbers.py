@@ -66,10 +66,11 @@ def numbers_of(scene: Scene, keys: Sequence[str], data: Measured) -> tuple[Numbe
     twice = [key for place, key in enumerate(keys) if key in keys[:place]]
     if twice:
         raise Refused(f"free: {twice[0]}: given twice")
-    if all(key.startswith(OFFSET) for key in keys):
+    found = tuple(_offset(key, data) if key.startswith(OFFSET) else _number(scene, key) for key in keys)
+    if all(number.channel is not None for number in found):
         raise Refused(f"free: {', '.join(keys) or 'nothing'}; allowed: at least one number of the scene, such as"
                       " left_contact.hertz_N_per_m1_5")
-    return tuple(_offset(key, data) if key.startswith(OFFSET) else _number(scene, key) for key in keys)
+    return found
 
 
 def acts(key: str) -> bool:

@@ -47,7 +47,8 @@ def read_texts(source: str, document: Mapping[Any, Any]) -> tuple[str, tuple[str
         if not is_text(value):
             raise SceneError(f"{source}: {key}: {value!r} is not allowed; allowed: a text without control characters")
     if not isinstance(readings, (list, tuple)) or not all(is_text(reading) for reading in readings):
-        raise SceneError(f"{source}: readings: {readings!r} is not allowed; allowed: a list of such texts")
+        raise SceneError(f"{source}: readings: {readings!r} is not allowed; allowed: a list of texts without control"
+                         " characters")
     return title, tuple(readings), watch
 
 

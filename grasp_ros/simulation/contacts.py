@@ -36,14 +36,19 @@ def side_of(name: str) -> Body:
     return SIDES[name]
 
 
+def check_located(run: Trajectory) -> None:
+    """Refuse a run by a method that does not look for contacts: without events there were none, otherwise."""
+    if not METHODS[run.method].events:
+        known = ", ".join(name for name, method in METHODS.items() if method.events)
+        raise Refused(f"{run.scene.name}: {run.method} does not look for contacts; allowed: a run by {known}")
+
+
 def intervals(run: Trajectory, side: Body) -> Array:
     """Begin and end of every stretch with u > 0 of one side, (n, 4): s, and u' at both, m/s.
 
     u' is NaN at a begin or an end that is that of the run.
     """
-    if not METHODS[run.method].events:
-        known = ", ".join(name for name, method in METHODS.items() if method.events)
-        raise Refused(f"{run.scene.name}: {run.method} does not look for contacts; allowed: a run by {known}")
+    check_located(run)
     touch, release = Transition.TOUCH, Transition.RELEASE
     own = run.event_table[run.event_table[:, Entry.BODY] == side]
     own = own[np.isin(own[:, Entry.KIND], (touch, release))]

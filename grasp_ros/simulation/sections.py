@@ -31,9 +31,14 @@ class Section(NamedTuple):
 
 def as_function(section: Function | ArrayLike, level: float) -> Function:
     """A function whose zeros are wanted, of weights (6,) of the state or of a callable."""
+    if not np.isfinite(level):
+        raise Refused(f"level: {level!r} is not allowed; allowed: a finite number")
     if callable(section):
-        return lambda t, state: np.asarray(section(t, state), dtype=float) - level
-    weights = column("function", section)
+        return lambda t, state: np.asarray(section(t, state)) - level
+    try:
+        weights = column("function", section)
+    except Refused:
+        weights = np.zeros(0)
     if weights.shape != (6,) or not np.isfinite(weights).all() or not weights.any():
         raise Refused(f"section: {section!r} is not allowed; allowed: six weights of the state, not all 0, or a"
                       " callable of times (n,) and states (n, 6)")
@@ -70,11 +75,11 @@ def crossings(function: Function, direction: int, breaks: Array, states: States)
 
 
 def _checked(function: Function, t: Array, state: Array) -> Array:
-    values = np.asarray(function(t, state), dtype=float)
-    if values.shape != t.shape or not np.isfinite(values).all():
-        raise Refused(f"section: gives numbers of shape {values.shape} for times of shape {t.shape}, or some that are"
-                      " not finite; allowed: a finite number for each")
-    return values
+    values = np.asarray(function(t, state))
+    if values.shape != t.shape or values.dtype.kind not in "fiub" or not np.isfinite(values).all():
+        raise Refused(f"section: gives {values.dtype}, shape {values.shape}, for times of shape {t.shape}, or some that"
+                      " are not finite; allowed: a finite number for each")
+    return values.astype(float)
 
 
 def _carried(signs: Array) -> NDArray[np.int64]:

@@ -26,7 +26,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.files import opened
 from grasp_ros.scene.npz import signed
-from grasp_ros.simulation.contacts import contact_table, side_of
+from grasp_ros.simulation.contacts import check_located, contact_table, side_of
 from grasp_ros.simulation.repeat import breaks_of, states_at
 from grasp_ros.simulation.sections import Function, Section, as_function, crossings
 from grasp_ros.simulation.tables import Tabular
@@ -189,8 +189,10 @@ class Trajectory(Tabular, Frozen):
         Raises
         ------
         Refused
-            If the run cannot be repeated, see `at`; `event_table` needs no repetition.
+            If the run cannot be repeated, see `at`; `event_table` needs no repetition. Or if its method does not look
+            for contacts.
         """
+        check_located(self)
         return to_events(self.event_table, self.at(self.event_table[:, Entry.TIME]))
 
     def contacts(self, side: str) -> np.ndarray:
@@ -249,11 +251,13 @@ class Trajectory(Tabular, Frozen):
         Raises
         ------
         Refused
-            If there is no such kind or side.
+            If there is no such kind or side, or the method does not look for contacts.
         """
+        check_located(self)
         for name, value, known in (("kind", kind, Transition), ("side", side, Body)):
             if value not in [*known]:
-                raise Refused(f"{name}: {value!r} is not allowed; allowed: {', '.join(one.name for one in known)}")
+                allowed = ", ".join(f"{known.__name__}.{one.name}" for one in known)
+                raise Refused(f"{name}: {value!r} is not allowed; allowed: {allowed}")
         chosen: Array = self.event_table[(self.event_table[:, 1] == side) & (self.event_table[:, 2] == kind), 0]
         return chosen
 
@@ -275,7 +279,7 @@ class Trajectory(Tabular, Frozen):
             t=self.t, state=self.state, command=self.command, inputs=self.inputs,
             V=level.V, V_c=level.V_c, V_rate=level.V_rate, mode=level.mode, **self.parts._asdict(),
             epsilon=self.epsilon, impacts=self.impacts,
-            **{name: self.times(*which) for name, which in MOMENTS.items()},
+            **{name: self.times(*which) for name, which in MOMENTS.items() if METHODS[self.method].events},
             events=self.event_table, work=self.work,
             work_names=np.array([name.replace(" ", "_") for name in self.counters]), status=self.status.name,
             method=self.method, setting=float(self.setting), sampled=self.sampled, stop=self.stop,

@@ -88,7 +88,7 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("simulate case_01 --grid 1000000000000", "--grid: 1000000000000 is not allowed; allowed: as many as fit"),
         (f"simulate case_01 --grid {10**30}", "is not allowed; allowed: as many as fit into memory"),
         ("simulate case_01 --sampled --set time.duration_s=1e9 --set time.control_period_s=1e-9",
-         "case_01: control periods: 1000000000000000000 is not allowed"),
+         "case_01: time.duration_s / control_period_s: 1000000000000000000 is not allowed"),
         ("simulate case_01 --accuracy 1", "exact: accuracy 1.0 is not allowed; allowed: 1e-16 to 0.001"),
         ("simulate case_01 --accuracy nan", "exact: accuracy nan is not allowed"),
         ("simulate case_01 --method rk4 --max-work 7", "rk4: has no budget of work"),

@@ -104,8 +104,11 @@ def test_no_contact_is_an_empty_table_and_no_side_is_refused() -> None:
     assert len(simulate(scene.load("no_contact")).contacts("left")) == 0
     with pytest.raises(Refused, match="side 'up' is not allowed; allowed: left or right"):
         simulate(case_of()).contacts("up")
-    with pytest.raises(Refused, match="rk4 does not look for contacts; allowed: a run by exact, "):
-        simulate(case_of(), method="rk4").contacts("left")
+    run = simulate(case_of(), method="rk4")
+    for ask in (lambda: run.contacts("left"), lambda: run.events, lambda: run.times(Transition.TOUCH, LEFT)):
+        with pytest.raises(Refused, match="rk4 does not look for contacts; allowed: a run by exact, "):
+            ask()
+    assert "touch_left" not in run.contents()
 
 
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-6, 1e-9])

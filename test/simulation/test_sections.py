@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -98,9 +99,13 @@ def test_a_graze_that_does_not_cross_is_no_crossing() -> None:
     ("section", "direction", "sentence"),
     [
         ([1.0, 2.0], 0, "six weights of the state"), (np.zeros(6), 0, "not all 0"), (V_O, 2, "direction: 2"),
-        (lambda t, y: y, 0, "a finite number for each"), (lambda t, y: np.full_like(t, np.nan), 0, "not finite"),
+        (None, 0, "six weights of the state"), ("x", 0, "six weights of the state"),
+        (lambda t, y: 1j * t, 0, "gives complex128"), (lambda t, y: y, 0, "a finite number for each"),
+        (lambda t, y: np.full_like(t, np.nan), 0, "not finite"),
     ],
 )
 def test_what_is_no_section_is_refused(section: Any, direction: int, sentence: str) -> None:
     with pytest.raises(Refused, match=sentence):
         simulate(case_of()).section(section, direction=direction)
+    with pytest.raises(Refused, match=r"^level: nan is not allowed; allowed: a finite number$"):
+        simulate(case_of()).section(V_O, level=math.nan)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+import re
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
@@ -26,6 +27,7 @@ from grasp_ros.physics.errors import Refused, described
 from grasp_ros.physics.observation import Observation, asked
 
 SIGNATURE = float64(int64, float64, float64, float64)
+COLOUR, BESIDE = re.compile(r"\x1b\[[0-9;]*m"), ("Failed in", "During")  # of numba's errors
 PROTOTYPE = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double)
 
 
@@ -89,9 +91,10 @@ class UserController:
         try:
             function: Any = _compiled(law) if compiled else PROTOTYPE(self._answer)
         except NumbaError as error:
-            words = " ".join(str(error).split())
+            lines = [line.strip() for line in COLOUR.sub("", str(error)).splitlines()]
+            why = next((line for line in lines if line and not line.startswith(BESIDE)), type(error).__name__)
             raise Refused(f"controllers: {side}: {self.name} cannot be compiled for a whole number and three floats,"
-                          f" with a float as its answer: {words}") from None
+                          f" with a float as its answer: {why}") from None
         self._function = function  # which must not go before the address does
         self.address: int = function.address if compiled else ctypes.cast(function, ctypes.c_void_p).value or 0
 

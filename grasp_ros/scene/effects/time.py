@@ -26,7 +26,8 @@ EFFECTS = (
         (
             Parameter("duration_s", *RANGES["duration"].bounds, "length of the run", open_low=True),
             Parameter("control_period_s", *RANGES["control period"].bounds,
-                      "how long a command is held if the feedback is sampled", open_low=True),
+                      "how long a command is held if the feedback is sampled, and an external force stays the same",
+                      open_low=True),
         ),
         nothing, "none", problems=_problems,
     ),
