@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import subprocess
@@ -14,17 +15,21 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rclpy
 from graphs import call
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from processes import DEADLINE, children, growing, node_command, wait_for
+from processes import DEADLINE, children, end_nodes, growing, node_command, wait_for
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.verify import verify
+from grasp_ros.graph.nodes.plant import Plant
 from grasp_ros.graph.ros import messages
+from grasp_ros.graph.serialization import force_message
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, WINDOW
 from lab.drills.nodes import plain_messages
 from lab.site.examples import titled
@@ -71,6 +76,16 @@ def test_a_silent_controller_has_the_declared_reaction(launch: Any, reaction: st
     assert plant.returncode == status
     assert f"left: no command that answers a state of the last 0.25 s, at tick 250: {reaction}" in errors
     assert ("finished 20000 ticks" in errors) is (reaction == "zero")
+
+
+def test_who_has_sent_a_first_command_is_not_waited_for(context: rclpy.Context) -> None:
+    """A quick controller was named in place of the slow one beside it."""
+    given = {"scene": "case_01", "free_running": True, "wait_for_controllers": True, "wait_for_monitor": False}
+    plant = Plant(context=context, parameter_overrides=[Parameter(name, value=own) for name, own in given.items()])
+    left, right = plant.scene.controllers.values()
+    plant.loop._on_command("left", left, force_message(0, 1.0))
+    assert [(need.topic, need.due) for need in plant.needs()] == [(left, math.inf), (right, plant.asked)]
+    end_nodes(plant)
 
 
 def test_periods_of_more_than_half_a_second_are_not_late(launch: Any) -> None:

@@ -84,8 +84,9 @@ class FreeRunning:
     def needs(self) -> Iterator[Need]:
         """The monitor, and first commands where it waits for them; later ones have timeouts of their own."""
         if self._awaits:
-            for topic in self._plant.scene.controllers.values():
-                yield Need(topic, Gone.AS_TOLD, what="first command", due=self._plant.asked, first=True)
+            for topic, held in zip(self._plant.scene.controllers.values(), self._held.values(), strict=True):
+                due = math.inf if held.ever else self._plant.asked
+                yield Need(topic, Gone.AS_TOLD, what="first command", due=due, first=True)
         if self._plant.monitored:
             yield Need(LYAPUNOV, Gone.ENDS)
 

@@ -197,7 +197,7 @@ class Remote(GraspNode):
         nobody = f"no {name.rpartition('/')[0]} answers {place(os.environ, self.get_namespace())}"
         self._wait(client.service_is_ready, nobody)
         future = client.call_async(request)
-        self._wait(future.done, nobody)
+        self._wait(future.done, f"{name}: is there, and has not answered in {PATIENCE_SECONDS:g} s")
         return future.result()
 
     def _wait(self, condition: Callable[[], bool], otherwise: str) -> None:
