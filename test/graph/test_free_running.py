@@ -27,6 +27,7 @@ from sensor_msgs.msg import JointState
 from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.verify import verify
+from grasp_ros.graph.health.peers import PeerNode
 from grasp_ros.graph.nodes.plant import Plant
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.serialization import force_message
@@ -86,6 +87,28 @@ def test_who_has_sent_a_first_command_is_not_waited_for(context: rclpy.Context) 
     plant.loop._on_command("left", left, force_message(0, 1.0))
     assert [(need.topic, need.due) for need in plant.needs()] == [(left, math.inf), (right, plant.asked)]
     end_nodes(plant)
+
+
+@pytest.mark.parametrize("monitored", [True, False])
+def test_a_free_run_begins_when_its_monitor_has_heard_all_controllers(context: rclpy.Context, monitored: bool) -> None:
+    """DDS connected one of a user's with the monitor seconds after the plant: the bag lacked its commands."""
+    given = {"scene": "case_01", "free_running": True, "wait_for_controllers": True, "wait_for_monitor": monitored}
+    plant = Plant(context=context, parameter_overrides=[Parameter(name, value=own) for name, own in given.items()])
+    peer, sides = PeerNode("left_controller", context=context), plant.scene.controllers
+    executor = SingleThreadedExecutor(context=context)
+    for node in (plant, peer):
+        executor.add_node(node)
+    for heard in ([], [*sides.values()]):
+        for topic in heard:
+            peer.heartbeats.confirm(topic.name)
+        wait_for(lambda: executor.spin_once(timeout_sec=0.1) or all(
+            plant.heartbeats.hear(topic.name) for topic in heard), "the heartbeats")  # noqa: B023
+        for side, topic in zip(("left", "right"), sides.values(), strict=True):
+            plant.loop._on_command(side, topic, force_message(0, 1.0))
+        waits = monitored and not heard
+        assert plant.loop.missing() == ([topic.name for topic in sides.values()] if waits else [])
+    executor.shutdown()
+    end_nodes(plant, peer)
 
 
 def test_periods_of_more_than_half_a_second_are_not_late(launch: Any) -> None:

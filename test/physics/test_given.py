@@ -154,7 +154,7 @@ NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
     (lambda bounds: design(CASE, {GAIN: (1, 2)}, "touches", bounds), 0, "subject_to: 0"),
     (lambda side: simulate(CASE).contacts(side), ["left"], "side: list"),
     (lambda side: contact_intervals(simulate(CASE), side), 0, "side: int"),
-    (lambda weights: simulate(CASE).section(weights), {}, "function: shape ()"),
+    (lambda weights: simulate(CASE).section(weights), {}, "section: {}"),
     (scenes.load, None, "reference: NoneType"), (load, 1, "path: int"), (read_bag, [], "path: list"),
     (lambda path: simulate(CASE).save(path), None, "path: NoneType"),
     (lambda path: simulate(CASE).to_csv(path), 1, "path: int"),

@@ -16,7 +16,7 @@ import uuid
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +52,8 @@ class Heartbeat:
     ended: str  # its last words; empty while it lives
     process: str  # its number and beginning, as the kernel has them
     ready: bool  # whether it has begun to look for others: before it may compile
+    # Topics of which it has had a message, as far as others wait for that.
+    hears: list[str] = field(default_factory=list)
     heard: float = 0.0  # wall time of the last one, s
 
     @property
@@ -108,6 +110,12 @@ class Heartbeats:
         """Let all know what has changed, before what is published next."""
         self._beat()
         self.publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGE_SECONDS))
+
+    def confirm(self, topic: str) -> None:
+        """Let all know that this node has had a message of a topic."""
+        if topic not in self.own.hears:
+            self.own.hears.append(topic)
+            self.tell()
 
     def end(self, words: str) -> None:
         """The last heartbeat."""
@@ -175,6 +183,10 @@ class Heartbeats:
         """Whether a process has said its last words, or is not known."""
         return identity not in self._beats or bool(self._beats[identity].ended)
 
+    def hear(self, topic: str) -> bool:
+        """Whether somebody else has had a message of a topic."""
+        return any(topic in beat.hears and not beat.ended for beat in self._beats.values())
+
     def speakers(self) -> bool:
         """Whether anybody is there who says texts."""
         return any(beat.texts and not beat.ended for beat in self._beats.values())
@@ -186,7 +198,8 @@ def _parsed(text: str) -> Heartbeat | None:
         return None
     try:
         beat = Heartbeat(**json.loads(text))
-        words = [beat.node, beat.identity, beat.ended, beat.process, *beat.texts]
+        words = [beat.node, beat.identity, beat.ended, beat.process, *beat.texts, *beat.hears]
     except (ValueError, TypeError, RecursionError):
         return None
-    return beat if isinstance(beat.texts, list) and all(isinstance(word, str) for word in words) else None
+    lists = isinstance(beat.texts, list) and isinstance(beat.hears, list)
+    return beat if lists and all(isinstance(word, str) for word in words) else None

@@ -113,8 +113,14 @@ class FreeRunning:
         elif self._limits.admit(topic, cdr):
             held.force, held.answers, held.ever = force, tick, True
             self.answered = self.answered or all(own.ever for own in self._held.values())
-            self._awaits = self._awaits and not self.answered
+            self._awaits = self._awaits and not (self.answered and self._heard)
             self.advance()
+
+    @property
+    def _heard(self) -> bool:
+        """Whether the monitor has had commands of all: DDS may connect a controller with it seconds after the plant."""
+        topics, hear = self._plant.scene.controllers.values(), self._plant.heartbeats.hear
+        return not self._plant.monitored or all(hear(topic.name) for topic in topics)
 
     def advance(self) -> None:
         """Compute the periods that are over."""

@@ -157,8 +157,7 @@ class Monitor(PeerNode):
         self._recorder = Recorder(self._path, scene, versions(), names, running)
         self._soon = self.wall_timer(MOST_SECONDS, self._complete)
         self._soon.cancel()
-        self.begun, self.concern = True, ""
-        self.phase = Phase.RUNNING
+        self.begun, self.concern, self.phase = True, "", Phase.RUNNING
         self.words = f"recording {running.words}; {scene.certificate_in_words(sampled=True)}"
         self.get_logger().info(self.words)
         for side, command in COMMANDS.items():
@@ -174,8 +173,9 @@ class Monitor(PeerNode):
     def _record(self, topic: Topic, cdr: bytes) -> None:
         """Keep what does not come with every state, at the time of the last one, as long as it is not too much."""
         self._beside[topic] += len(cdr)
-        if self._recorder is None:
-            return
+        assert self._recorder is not None
+        if topic in COMMANDS.values():
+            self.heartbeats.confirm(topic.name)
         if len(cdr) > MOST_BYTES or self._beside[topic] > MOST_BESIDE_BYTES:
             self.refuse(DIAGNOSTICS_LEFT_OUT if topic == DIAGNOSTICS else NOT_RECORDED, topic)
         elif self._due:
