@@ -137,9 +137,10 @@ def test_a_monitor_that_was_behind_has_all_commands_of_a_free_run(
     shell = launch(*GRASP, "ctl", **PIPES)
     ask = partial(answer_of, shell)
     wait_for(lambda: "paused at tick 0 of" in ask("status"), "the first state")
+    assert ask("step 1").startswith("arm_alone: paused at tick 1 of")  # it has begun: the monitor has had a command
     monitor = children(tmp_path)["monitor"]
     os.kill(monitor, signal.SIGSTOP)
-    assert ask("step 450").startswith("arm_alone: paused at tick 450 of 450")
+    assert ask("step 449").startswith("arm_alone: paused at tick 450 of 450")
     shell.communicate("resume\n", timeout=DEADLINE)
     os.kill(monitor, signal.SIGCONT)
     out, err = run.communicate(timeout=DEADLINE)
