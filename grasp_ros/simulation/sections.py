@@ -34,7 +34,7 @@ def as_function(section: Function | ArrayLike, level: float) -> Function:
     if not np.isfinite(level):
         raise Refused(f"level: {level!r} is not allowed; allowed: a finite number")
     if callable(section):
-        return lambda t, state: np.asarray(section(t, state)) - level
+        return lambda t, state: _real(section(t, state)) - level
     try:
         weights = column("function", section)
     except Refused:
@@ -76,10 +76,16 @@ def crossings(function: Function, direction: int, breaks: Array, states: States)
 
 def _checked(function: Function, t: Array, state: Array) -> Array:
     values = np.asarray(function(t, state))
-    if values.shape != t.shape or values.dtype.kind not in "fiub" or not np.isfinite(values).all():
-        raise Refused(f"section: gives {values.dtype}, shape {values.shape}, for times of shape {t.shape}, or some that"
-                      " are not finite; allowed: a finite number for each")
-    return values.astype(float)
+    if values.shape != t.shape or not np.isfinite(values).all():
+        raise Refused(f"section: gives numbers of shape {values.shape} for times of shape {t.shape}, or some that are"
+                      " not finite; allowed: a finite number for each")
+    return values
+
+
+def _real(values: ArrayLike) -> Array:
+    if np.iscomplexobj(values):  # numpy would drop the imaginary parts
+        raise Refused("section: gives complex numbers; allowed: a finite number for each")
+    return np.asarray(values, dtype=float)
 
 
 def _carried(signs: Array) -> NDArray[np.int64]:

@@ -95,6 +95,7 @@ def test_a_free_run_begins_when_its_monitor_has_heard_all_controllers(context: r
     given = {"scene": "case_01", "free_running": True, "wait_for_controllers": True, "wait_for_monitor": monitored}
     plant = Plant(context=context, parameter_overrides=[Parameter(name, value=own) for name, own in given.items()])
     peer, sides = PeerNode("left_controller", context=context), plant.scene.controllers
+    plant.asked = 1.0  # when its first state was published, in s
     executor = SingleThreadedExecutor(context=context)
     for node in (plant, peer):
         executor.add_node(node)
@@ -102,11 +103,12 @@ def test_a_free_run_begins_when_its_monitor_has_heard_all_controllers(context: r
         for topic in heard:
             peer.heartbeats.confirm(topic.name)
         wait_for(lambda: executor.spin_once(timeout_sec=0.1) or all(
-            plant.heartbeats.hear(topic.name) for topic in heard), "the heartbeats")  # noqa: B023
+            plant.heartbeats.confirmed(topic.name) for topic in heard), "the heartbeats")  # noqa: B023
         for side, topic in zip(("left", "right"), sides.values(), strict=True):
             plant.loop._on_command(side, topic, force_message(0, 1.0))
         waits = monitored and not heard
         assert plant.loop.missing() == ([topic.name for topic in sides.values()] if waits else [])
+        assert any(need.due == plant.asked for need in plant.needs()) is waits  # so that it does not wait for ever
     executor.shutdown()
     end_nodes(plant, peer)
 

@@ -183,7 +183,7 @@ class Heartbeats:
         """Whether a process has said its last words, or is not known."""
         return identity not in self._beats or bool(self._beats[identity].ended)
 
-    def hear(self, topic: str) -> bool:
+    def confirmed(self, topic: str) -> bool:
         """Whether somebody else has had a message of a topic."""
         return any(topic in beat.hears and not beat.ended for beat in self._beats.values())
 

@@ -88,7 +88,8 @@ class FreeRunning:
                 due = math.inf if held.ever else self._plant.asked
                 yield Need(topic, Gone.AS_TOLD, what="first command", due=due, first=True)
         if self._plant.monitored:
-            yield Need(LYAPUNOV, Gone.ENDS)
+            due = self._plant.asked if self._awaits and self.answered else math.inf
+            yield Need(LYAPUNOV, Gone.ENDS, what="sign of having had a command of each side", due=due, first=True)
 
     def ask_again(self, now: float) -> None:
         """Publish the first state again while it waits for an answer; then the wall clock goes on."""
@@ -119,8 +120,8 @@ class FreeRunning:
     @property
     def _heard(self) -> bool:
         """Whether the monitor has had commands of all: DDS may connect a controller with it seconds after the plant."""
-        topics, hear = self._plant.scene.controllers.values(), self._plant.heartbeats.hear
-        return not self._plant.monitored or all(hear(topic.name) for topic in topics)
+        confirmed, topics = self._plant.heartbeats.confirmed, self._plant.scene.controllers.values()
+        return not self._plant.monitored or all(confirmed(topic.name) for topic in topics)
 
     def advance(self) -> None:
         """Compute the periods that are over."""
