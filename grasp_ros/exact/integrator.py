@@ -16,7 +16,19 @@ from grasp_ros.exact.driver.outputs import SPARE
 from grasp_ros.exact.driver.rest import SINCE
 from grasp_ros.exact.driver.workspace import workspace
 from grasp_ros.exact.events import Event, to_events
-from grasp_ros.exact.records import BODY_NUMBERS, Integers, Loop, Plant, Tables, new_state, one_interval, plant_of
+from grasp_ros.exact.records import (
+    BODY_NUMBERS,
+    REST_PLACE,
+    Integers,
+    Loop,
+    Plant,
+    State,
+    Tables,
+    new_state,
+    one_interval,
+    plant_of,
+    state_of,
+)
 from grasp_ros.physics import given
 from grasp_ros.physics.accuracy import ACCURACY, check_accuracy
 from grasp_ros.physics.energy import energy
@@ -47,6 +59,7 @@ class Status(Enum):
 _OUTPUTS, _EVENTS, _FILLED, _WORK = int(Filled.OUTPUTS), int(Filled.EVENTS), len(Filled), len(Work)
 _NO_TIMES, _NOBODY = np.zeros(0), np.zeros(2, dtype=np.int64)
 _DONE, _NO_COMMAND = int(Outcome.DONE), int(Outcome.NO_COMMAND)
+_AT_REST, _BODIES_THAT_ACT = REST_PLACE + SINCE, [0.0] * BODY_NUMBERS  # places of a state; numbers that kernels write
 
 
 class Observer(Protocol):
@@ -80,8 +93,6 @@ class Integrator:
     observer : Observer or None
     system, continuous : System and bool
         As given.
-    records : State
-        Where it stands, as the kernels see it.
 
     Raises
     ------
@@ -105,8 +116,8 @@ class Integrator:
         self.system, self.continuous = system, continuous
         self._max_events, self._max_work = whole("max_events", max_events, 0), whole("max_work", max_work, 0)
         self._plant_block = _block_of(system, continuous)
-        self._state_block, self.records = new_state(*state, state[X.L] - state[X.O], state[X.O] - state[X.R])
-        self.records.rest[SINCE] = math.inf
+        self._state_block, self._mode = new_state(*state, state[X.L] - state[X.O], state[X.O] - state[X.R])
+        self._state_block[_AT_REST] = math.inf
         self._events: list[Array] = []
         self._event_count = 0
         self.observer: Observer | None = None
@@ -115,6 +126,11 @@ class Integrator:
     def plant(self) -> Plant:
         """What the kernels simulate."""
         return plant_of(self._plant_block)
+
+    @cached_property
+    def records(self) -> State:
+        """Where it stands, as the kernels see it."""
+        return state_of(self._state_block, self._mode)
 
     @property
     def state(self) -> Array:
@@ -135,7 +151,7 @@ class Integrator:
     @property
     def at_rest(self) -> float | None:
         """Time in s since when everything is at rest, see `driver.rest`; None if it is not."""
-        since = float(self.records.rest[SINCE])
+        since = float(self._state_block[_AT_REST])
         return since if math.isfinite(since) else None
 
     @property
@@ -224,7 +240,7 @@ class Integrator:
                 allowed = event_rows[: self._max_events - self._event_count + SPARE]
                 most = min(self._spent + BREATH, self._max_work)
                 outcome = advance(
-                    block, order, self._plant_block, self._state_block, self.records.mode, self._accuracy, most, grid,
+                    block, order, self._plant_block, self._state_block, self._mode, self._accuracy, most, grid,
                     out, allowed, filled, self.work, observer, tuple(loop))
                 if count := int(filled[_EVENTS]):
                     self._events.append(event_rows[:count].copy())
@@ -250,11 +266,12 @@ class Integrator:
 
 def _block_of(system: System, continuous: bool) -> Array:
     """Numbers of a plant, see `plant_of`; a body that is not there has a mass, and rests at 0 without any force."""
-    left, right, object_ = system.rows(continuous)
-    given = [*left, *right, *object_]
-    given[::4] = [mass or 1.0 for mass in given[::4]]
-    left, right = system.pairs.tolist()
-    return np.array([*given, *[0.0] * BODY_NUMBERS, *left, *right, system.coulomb, *given[3::4]])
+    (m_l, k_l, c_l, f_l), (m_r, k_r, c_r, f_r), (m_o, k_o, c_o, f_o) = system.rows(continuous)
+    pair_l, pair_r = system.pairs.tolist()
+    return np.array([
+        m_l or 1.0, k_l, c_l, f_l, m_r or 1.0, k_r, c_r, f_r, m_o or 1.0, k_o, c_o, f_o, *_BODIES_THAT_ACT,
+        *pair_l, *pair_r, system.coulomb, f_l, f_r, f_o,
+    ])
 
 
 @compiling

@@ -33,7 +33,7 @@ class Plant(NamedTuple):
 
 BODY_NUMBERS, PAIR_NUMBERS = 12, 4
 COULOMB = 2 * BODY_NUMBERS + PAIR_NUMBERS  # its place in the block of a plant
-PLANT_NUMBERS, STATE_NUMBERS = COULOMB + 4, 20
+PLANT_NUMBERS, STATE_NUMBERS, REST_PLACE = COULOMB + 4, 20, 17  # the last one of `State.rest` in its block
 
 
 def plant_of(block: Array) -> Plant:
@@ -55,19 +55,18 @@ class State(NamedTuple):
 
 def state_of(block: Array, mode: Integers) -> State:
     """A state whose numbers are parts of a block (STATE_NUMBERS,)."""
-    return State(block[:8], mode, block[8:14], block[14:17], block[17:])
+    return State(block[:8], mode, block[8:14], block[14:REST_PLACE], block[REST_PLACE:])
 
 
-def new_state(*y: float) -> tuple[Array, State]:
-    """Where a run begins: a block of numbers, first those of `State.y`, and its record, with modes not yet known."""
-    block = np.array([*y, *[0.0] * (STATE_NUMBERS - len(y))])
-    return block, state_of(block, _UNKNOWN.copy())
+def new_state(*y: float) -> tuple[Array, Integers]:
+    """Where a run begins, for `state_of`: a block of numbers, first those of `State.y`, and modes not yet known."""
+    return np.array([*y, *[0.0] * (STATE_NUMBERS - len(y))]), _UNKNOWN.copy()
 
 
 def new_run() -> tuple[Array, Array, Plant, State]:
     """What a run works on: blocks of plant and state, and their records."""
-    plant, (state, record) = np.zeros(PLANT_NUMBERS), new_state()
-    return plant, state, plant_of(plant), record
+    plant, (state, mode) = np.zeros(PLANT_NUMBERS), new_state()
+    return plant, state, plant_of(plant), state_of(state, mode)
 
 
 class Order(NamedTuple):

@@ -15,5 +15,5 @@ def solve(problem: Problem) -> Solution:
     integrator.progress = problem.progress
     drive = problem.drive or (lambda free: free.advance(problem.duration, problem.grid))
     states = drive(integrator)
-    return Solution(states, integrator.event_table, integrator.work.copy(), integrator.status, integrator.stop,
+    return Solution(states, integrator.event_table, integrator.work, integrator.status, integrator.stop,
                     integrator.at_rest)
