@@ -6,7 +6,7 @@
 
 What is listed in `__all__` is imported when it is first used, so that `import grasp_ros` costs nothing.
 
-Rooms, each importing only from those below it (pyproject.toml has the contract): `cli`; `identification` (numbers from
+Parts, each importing only from those below it (pyproject.toml has the contract): `cli`; `identification` (numbers from
 measurements) and `optimization` (numbers chosen for an outcome); `graph` (nodes and bags), `maps` (many runs in files)
 and `accuracy` (what it costs); `simulation` (a run without ROS); `sensitivity` (derivatives carried along); `methods`
 (the other integrators) and `observe` (what is seen of a run); `exact` (the compiled integrator) and `scene` (what a

@@ -30,11 +30,11 @@ class Advice(NamedTuple):
 def compare(scene: Scene, contenders: Sequence[Contender], truth: Truth, effort: Effort = QUICK,
             seconds: float = SECONDS, progress: Callable[[float], object] | None = None
             ) -> tuple[list[Record], list[str]]:
-    """Measure solvers from their loosest setting on until the time is over: next is who has had the least of it.
+    """Measure solvers from their coarsest setting on; the next is the solver that has used the least time.
 
-    Nobody begins before those ahead have had as much as the patience, so that a fast solver is through at once; who
-    takes longer than that climbs no further. No measurement begins after so many seconds; the progress is told those
-    gone by. Also returned are the names of solvers with settings that nobody came to, because the time was over.
+    A solver that has not begun counts as having used `effort.patience`, so that fast ones finish first; a solver whose
+    run takes longer than that gets no finer setting. No measurement begins after `seconds`; `progress` gets the
+    seconds used. Also returned: the names of solvers with settings not measured for lack of time.
     """
     begin = time.monotonic()
     records: list[Record] = []

@@ -35,10 +35,10 @@ def add_to(commands: Any) -> None:
 
 def add_limits(sub: argparse.ArgumentParser) -> None:
     """What a free run has to keep."""
-    sub.add_argument("--max-age", type=float, metavar="N", help="of a free run: exit status 1 if a command was older,"
-                     " in control periods")
-    sub.add_argument("--min-factor", type=float, metavar="F", help="of a free run: exit status 1 if it was slower,"
-                     " simulated seconds in a second")
+    sub.add_argument("--max-age", type=float, metavar="N", help="free run: exit status 1 if a command was older than"
+                     " N control periods")
+    sub.add_argument("--min-factor", type=float, metavar="F", help="free run: exit status 1 if slower than F"
+                     " simulated seconds per second")
 
 
 def check_limits(options: argparse.Namespace, lockstep: bool) -> None:
@@ -55,7 +55,7 @@ def keeps(recording: Recording, options: argparse.Namespace) -> bool:
     if options.max_age is not None and not oldest <= options.max_age:
         broken.append(f"--max-age {options.max_age:g}: the oldest command was {oldest:g} periods old")
     if options.min_factor is not None and not recording.reached >= options.min_factor:
-        broken.append(f"--min-factor {options.min_factor:g}: {recording.reached:.3g} s in a second was reached")
+        broken.append(f"--min-factor {options.min_factor:g}: {recording.reached:.3g} s per second was reached")
     for words in broken:
         print(f"grasp: {words}", file=sys.stderr)
     return not broken

@@ -24,10 +24,10 @@ def add_to(commands: Any) -> None:
     sub = add_command(commands, "design", _design)
     add_scene(sub)
     sub.add_argument("--free", action="append", required=True, metavar=RANGE,
-                     help="number to choose within a range; keys of one value joined by +; once for each number")
+                     help="number to choose within a range; + between keys that share one value; repeatable")
     sub.add_argument("--minimise", action="append", required=True, metavar="OUTCOME",
-                     help=f"outcome to make small: the largest column of one of {', '.join(GROUPS)}, or a column alone;"
-                     " given twice: choices none of which is better in both")
+                     help=f"outcome to minimise: the largest column of one of {', '.join(GROUPS)}, or one column;"
+                     " given twice: the Pareto front of both")
     sub.add_argument("--subject-to", action="append", default=[], metavar="OUTCOME<=NUMBER", dest="bounds",
                      help="largest value of an outcome, or of every column of a group")
     sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")

@@ -43,23 +43,23 @@ def add_to(commands: Any) -> None:
     )
     sub.add_argument(
         "--controller", dest="laws", action="append", default=[], metavar="SIDE=MODULE:OBJECT",
-        help="a law of your own in place of the scene's: called with tick, time, x, v and what else it asks for by name"
-        " it returns the force",
+        help="your controller instead of the scene's: a callable of tick, time, x, v and further named values that"
+        " returns the force",
     )
     sub.add_argument(
         "--free-running", type=float, nargs="?", const=1.0, metavar="FACTOR",
-        help="follow the wall clock, FACTOR simulated seconds in a second (default 1), instead of lockstep",
+        help="follow the wall clock, FACTOR simulated seconds per second (default 1), instead of lockstep",
     )
     _add_namespace(sub, "of all names, /clock too; for several graphs")
     sub.add_argument("--one-process", action="store_true", help="run all nodes in one process and one thread")
     sub.add_argument("--paused", action="store_true", help="begin paused at the first state, see ctl")
     sub.add_argument(
         "--peer-timeout", type=float, default=PEER_SECONDS, metavar="S",
-        help="wall time without a sign of life or an answer of a node after which it is silent"
+        help="wall time without a heartbeat or an answer after which a node is silent"
         f" (default {PEER_SECONDS:g} s)",
     )
     sub.add_argument(
-        "--on-silence", choices=("end", "wait"), default="end", help="what is done when a node is gone or silent"
+        "--on-silence", choices=("end", "wait"), default="end", help="reaction when a node is gone or silent"
     )
     sub.add_argument("--no-check", action="store_true", help="do not simulate the run again to compare every bit")
     sub.add_argument("--no-figure", action="store_true", help="draw no figure")
@@ -67,11 +67,11 @@ def add_to(commands: Any) -> None:
     _add_network(sub)
     sub = add_command(commands, "replay", _replay)
     sub.add_argument("bag", type=Path, help="directory or file of a bag")
-    sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="seconds of the bag in a second (default 1)")
+    sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="playback: bag time / wall time (default 1)")
     _add_network(sub)
     sub = add_command(commands, "watch", _watch)
     sub.add_argument("bag", type=Path, nargs="?", help="a bag; default: the graph that runs")
-    sub.add_argument("--rate", type=float, metavar="R", help="seconds of the bag in a second (default 1)")
+    sub.add_argument("--rate", type=float, metavar="R", help="playback: bag time / wall time (default 1)")
     sub.add_argument("--from", dest="first", type=float, metavar="S", help="time in the bag to begin at, in s")
     _add_namespace(sub, "of the graph")
     _add_network(sub)

@@ -32,27 +32,27 @@ def add_to(commands: Any) -> None:
     add_scene(sub)
     add_accuracy(sub)
     add_json(sub)
-    sub.add_argument("--x", metavar=RANGE, help="number, section.key, along the map, n values (default 101), even or"
-                     " logarithmic; keys of one value are joined by +")
-    sub.add_argument("--y", metavar=RANGE, help="number up the map")
+    sub.add_argument("--x", metavar=RANGE, help="number of the x axis, section.key: n values (default 101), linear or"
+                     " logarithmic; + between keys with one value")
+    sub.add_argument("--y", metavar=RANGE, help="the same for y")
     sub.add_argument("--vary", action="append", default=[], metavar="KEY[+KEY]=low:high[::log]",
-                     help="one more number of a sample; keys of one value are joined by +")
+                     help="one more number of a sample; + between keys with one value")
     sub.add_argument("--sample", type=whole(1), default=0, metavar="N", help="N rows at random, a Sobol sequence")
     sub.add_argument("--seed", type=whole(0), default=0, metavar="S", help="of the sample (default 0)")
     sub.add_argument("--outcome", action="append", default=[], metavar="NAME",
                      help=f"one of {', '.join(GROUPS)}, or a column of one (default settling_time and touches)")
-    sub.add_argument("--settled", type=float, default=SETTLED, metavar="PART", help="part of the largest initial"
-                     f" displacement within which a run counts as settled (default {SETTLED:g})")
-    sub.add_argument("--horizons", type=whole(1), default=HORIZONS, metavar="N", help="durations that a run goes on for"
+    sub.add_argument("--settled", type=float, default=SETTLED, metavar="PART", help="a run is settled within this"
+                     f" fraction of the largest initial displacement (default {SETTLED:g})")
+    sub.add_argument("--horizons", type=whole(1), default=HORIZONS, metavar="N", help="most durations to simulate"
                      f" until V_c decides whether it has settled (default {HORIZONS})")
     sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
-    sub.add_argument("--max-events", type=whole(1), default=MAX_EVENTS, metavar="N", help="budget of a row")
-    sub.add_argument("--max-work", type=whole(1), default=MAX_WORK, metavar="N", help="budget of a row")
+    sub.add_argument("--max-events", type=whole(1), default=MAX_EVENTS, metavar="N", help="events per run")
+    sub.add_argument("--max-work", type=whole(1), default=MAX_WORK, metavar="N", help="work per run")
     where = sub.add_mutually_exclusive_group()
     where.add_argument("--workers", type=whole(1), default=0, metavar="N", help="processes of a Dask cluster")
     where.add_argument("--scheduler", default="", metavar="tcp://HOST:PORT", help="a Dask cluster that exists")
     sub.add_argument("-o", "--output", type=Path, metavar="FILE.zarr", required=True,
-                     help="new directory, or one of the same map, which is completed; figures come beside it")
+                     help="new directory, or an unfinished map to complete; figures are written next to it")
 
 
 @needing("`grasp map`", "map")

@@ -38,7 +38,7 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--method", choices=METHODS, default=EXACT, help="scenes: way to integrate; see `grasp methods`")
     sub.add_argument("--step", type=float, metavar="S", help="scenes: step or tolerance of the method")
     sub.add_argument("--sensitivity", action="append", default=[], metavar="KEY",
-                     help="one scene: below it derivatives of the positions by its number section.key; repeatable")
+                     help="one scene: also draw derivatives of positions with respect to section.key; repeatable")
     sub.add_argument("--panel", dest="panels", action="append", choices=plots.PANELS, metavar="P",
                      help=f"what is drawn, in this order; repeatable: {', '.join(plots.PANELS)} (default: all)")
     sub.add_argument("--from", dest="first", type=float, metavar="S", help="first time shown, in s")
@@ -47,7 +47,7 @@ def add_to(commands: Any) -> None:
     add_file(sub, "FILE", "image, say .png, .svg or .pdf; - is the standard output (default: .png beside the source)")
     sub.add_argument("--animate", action="store_true",
                      help="a moving picture of one source instead, .gif or .html (default: .gif beside it)")
-    sub.add_argument("--speed", type=float, default=1.0, metavar="R", help="its seconds in a second (default 1)")
+    sub.add_argument("--speed", type=float, default=1.0, metavar="R", help="playback speed (default 1)")
 
 
 def _plot(options: argparse.Namespace) -> int:

@@ -56,7 +56,7 @@ def describe_trajectory(trajectory: Trajectory, found: dict[str, Any]) -> list[R
         rows += _amounts(found)
     rows.append(("certificate", found["certificate"]))
     if "V_c_rise_J" in found:
-        rows.append(("risen by the method", f"{found['V_c_rise_J']:.3g} J of V_c"))
+        rows.append(("V_c rise", f"{found['V_c_rise_J']:.3g} J, numerical error"))
     return _with_words(trajectory.scene, rows, other=bool(own))
 
 
@@ -70,7 +70,7 @@ def _amounts(found: dict[str, Any]) -> list[Row]:
     if "last_outside_s" in found:
         times = found["last_outside_s"].items()
         outside = ", ".join(f"{name} {f'{time:.2f} s' if np.isfinite(time) else 'at the end'}" for name, time in times)
-        rows.append((f"last outside {SETTLED:.0%}", f"{outside}; V_c may rise, and does not tell what follows"))
+        rows.append((f"last outside {SETTLED:.0%}", f"{outside}; not a proof of settling: V_c may rise"))
     largest = [f"{name.replace('_', ' ')} {value:.5g} N" for name, value in found["largest_N"].items() if value > 0.0]
     if largest:
         names = {MOTION: "largest forces", TICKS: "largest at ticks", OUTPUTS: "largest at outputs"}
@@ -94,7 +94,7 @@ def _touches(found: dict[str, Any]) -> str:
 def describe_sensitivity(found: Sensitivity) -> Iterable[Row]:
     """Derivatives of the last state, of V_c there, and of the times of the last events, number by number."""
     for key, own in last_rates(found).items():
-        yield f"d / d {key}", f"at t = {own['t']:.6g} s, by its unit"
+        yield f"d / d {key}", f"at t = {own['t']:.6g} s, per unit"
         for body in found.scene.system.present:
             x, v = own["state"][COLUMN[body] : COLUMN[body] + 2]
             yield f"  {NAMES[body]} position, velocity", f"{x:.12g} m, {v:.12g} m/s"
@@ -126,7 +126,7 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
     left, right = found["contacts"].values()
     balanced, known = found["balanced_ticks"], not np.isnan(found["work_J"])
     lacks = balanced < found["ticks"]  # numbers of the monitor
-    none = "not known without lyapunov" if lacks else "none: the law of a controller is not known"
+    none = "unknown: lyapunov missing" if lacks else "none: the law of a controller is not known"
     closes = "closes at every tick" if known else f"closes at {balanced} ticks, others are not known"
     rows = [
         ("bag", found["bag"]),
@@ -181,7 +181,7 @@ def _timing(found: dict[str, Any]) -> list[Row]:
                      for side, age in found["command_age_periods"].items())
     late = [f"{side} for {count} periods" for side, count in found["timed_out_periods"].items() if count]
     return [
-        ("reached", f"{found['reached_s_per_s']:.3g} s in a second, {found['overruns']} overruns,"
+        ("reached", f"{found['reached_s_per_s']:.3g} s per second, {found['overruns']} overruns,"
                     f" {found['given_up_s']:.2g} s given up"),
         ("age of commands", ages or "none came"),
         *([("timed out", f"{', '.join(late)}, in which its last command was older than the timeout")] if late else []),

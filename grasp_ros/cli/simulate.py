@@ -32,9 +32,9 @@ def add_to(commands: Any) -> None:
                      help=f"equidistant output times (default {GRID_POINTS}; with --sampled all control periods)")
     sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
     sub.add_argument("--controller", dest="controllers", action="append", default=[], metavar="SIDE=MODULE:OBJECT",
-                     help="a callable of tick, time, x, v and what it asks for by name, in place of the feedback")
+                     help="callable of tick, time, x, v and further named values, instead of the feedback")
     sub.add_argument("--sensitivity", action="append", default=[], metavar="KEY",
-                     help="print derivatives by a number of the scene, section.key, through all impacts; repeatable;"
+                     help="print derivatives with respect to section.key, through all impacts; repeatable;"
                           " `grasp plot --sensitivity` draws them")
     result = sub.add_argument_group("result")
     add_file(result, "FILE", "write states, forces, V and, as .npz, events and counters; .csv, or - for the standard"

@@ -36,7 +36,7 @@ def play(recording: Recording, rate: float, first: float | None = None) -> None:
         while True:
             if not paused:
                 row = int(np.searchsorted(times, at + (time.monotonic() - since) * rate, side="right")) - 1
-            moment = moment_of(recording, row, "paused" if paused else f"{rate:g} s in a second")
+            moment = moment_of(recording, row, "paused" if paused else f"{rate:g} s per second")
             live.update(view.draw(moment, live.console.width), refresh=True)
             if not paused and row == len(times) - 1:
                 return

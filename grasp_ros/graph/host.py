@@ -71,7 +71,7 @@ def hold(given: Mapping[str, str], namespace: str) -> socket.socket:
         held.close()
         if error.errno != errno.EADDRINUSE:
             raise
-        raise Refused(f"a graph runs, or a bag is replayed, {place(given, namespace)}; allowed: another {DOMAIN} or"
+        raise Refused(f"a graph or a replay already runs {place(given, namespace)}; allowed: another {DOMAIN} or"
                       " --namespace") from None
     return held
 

@@ -8,20 +8,20 @@ import re
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 
-PEER_SECONDS, START_SECONDS = 1.5, 60.0  # without a sign of life of a node, and until it comes
+PEER_SECONDS, START_SECONDS = 1.5, 60.0  # without a heartbeat of a node, and until it comes
 Settings = dict[str, tuple[bool | float | str, str]]  # default and meaning by name
-TIMEOUT = "simulated time since the state that the last command answers, after which it is too old"
-ON_TIMEOUT = "what then acts: hold, zero or stop"
+TIMEOUT = "age of the last command, simulated time since the state it answers, that is too old"
+ON_TIMEOUT = "reaction: hold, zero or stop"
 PEERS: Settings = {
-    "peer_timeout_s": (PEER_SECONDS, "wall time without a sign of life or an answer"),
-    "start_timeout_s": (START_SECONDS, "wall time for peers to come and to answer first; 0: any"),
-    "on_silence": ("wait", "what is done when a peer is gone or silent: end or wait"),
+    "peer_timeout_s": (PEER_SECONDS, "wall time without a heartbeat or an answer"),
+    "start_timeout_s": (START_SECONDS, "wall time until peers appear and answer; 0: no limit"),
+    "on_silence": ("wait", "reaction to a peer that is gone or silent: end or wait"),
 }
 MONITORED: Settings = {
     "wait_for_monitor": (False, "start only when a monitor listens; a plant never outruns it"),
 }
 FREE: Settings = {  # exist with the wall clock
-    "real_time_factor": (1.0, "simulated seconds in a second"),
+    "real_time_factor": (1.0, "simulated seconds per second"),
     "wait_for_controllers": (False, "start the clock only when each controller has sent a command"),
     "left_timeout_s": (0.1, TIMEOUT), "left_on_timeout": ("zero", ON_TIMEOUT),
     "right_timeout_s": (0.1, TIMEOUT), "right_on_timeout": ("zero", ON_TIMEOUT),
@@ -34,14 +34,14 @@ PLANT: Settings = {
     "free_running": (False, "follow the wall clock instead of waiting for the commands"), **FREE, **PEERS,
 }
 CONTROLLER: Settings = {
-    **MONITORED, "law": ("", "a law of your own in place of the scene's, module:object"), **PEERS,
+    **MONITORED, "law": ("", "your controller instead of the scene's, module:object"), **PEERS,
 }
 NODES = {
     "plant": PLANT, "left_controller": CONTROLLER, "right_controller": CONTROLLER,
-    "monitor": {"bag": ("", "directory of the bag, which must not exist; else grasp_ and the time"), **PEERS},
+    "monitor": {"bag": ("", "new directory of the bag (default: grasp_ and the time)"), **PEERS},
 }
 TOOLS: dict[str, Settings] = {  # which commands of `grasp` become
-    "player": {"bag": ("", "directory of the bag"), "rate": (1.0, "seconds of the bag in a second")},
+    "player": {"bag": ("", "directory of the bag"), "rate": (1.0, "playback: bag time / wall time")},
     "remote": {"words": ("[]", "what to ask, a JSON list; empty: what the lines of the standard input say")},
     "watch": {},
 }

@@ -67,7 +67,7 @@ class Graph:
     plant: Mapping[str, str] = field(default_factory=dict)  # further parameters of it
     one_process: bool = False  # whether all nodes run in one process and one thread
     namespace: str = "/"  # of all names, /clock too where it is not the root
-    peer_timeout: float = PEER_SECONDS  # wall time without a sign of life, or an answer, after which a node is silent
+    peer_timeout: float = PEER_SECONDS  # wall time without a heartbeat, or an answer, after which a node is silent
     on_silence: str = "end"  # what the others do then; or "wait"
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
     begun: float | None = None  # wall time at which the bag was there
@@ -99,7 +99,7 @@ class Graph:
                 allowed = ", ".join(self.scene.controllers) or "none, this scene has no controller"
                 raise Refused(f"{self.scene.name}: {name}: no such controller; allowed: {allowed}")
         for name in self.laws.keys() & {*self.without}:
-            raise Refused(f"{name}: a law of its own, and without it: allowed: one of the two")
+            raise Refused(f"{name}: --controller and --without; allowed: one of the two")
         scene_file = self.directory / f"{self.scene.name}.yaml"
         settings = self._settings(scene_file)
         self._place = hold(os.environ, self.namespace)
@@ -201,7 +201,7 @@ class Graph:
                         else:
                             os.sched_setscheduler(int(thread.name), os.SCHED_RR, os.sched_param(PRIORITY))
         except OSError as error:
-            print(f"grasp: real-time priority is not to be had here ({error.strerror}): goes on without, and commands"
+            print(f"grasp: real-time priority is not available here ({error.strerror}); without it commands"
                   " get older on busy processors", file=sys.stderr)
 
     def _check(self) -> None:
@@ -232,7 +232,7 @@ class Graph:
                 self._stopped[name] = math.inf if found.si_code == os.CLD_CONTINUED else time.monotonic()
         patience = self.peer_timeout + (0.0 if self.one_process else NODES_SECONDS)
         if self.on_silence == "end" and time.monotonic() - self._stopped.get(name, math.inf) > patience:
-            raise GraphError(f"{name}: was stopped, and did not go on for {patience:g} s")
+            raise GraphError(f"{name}: was suspended for more than {patience:g} s")
 
     def stop(self) -> dict[str, int]:
         """Interrupt what still runs, wait for it, and return the exit statuses."""

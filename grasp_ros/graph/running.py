@@ -16,7 +16,7 @@ LEAST = 1e-6  # real-time factor
 
 
 def check_factor(factor: float) -> None:
-    """Refuse what no free run can have as its simulated seconds in a second."""
+    """Refuse what no free run can have as its simulated seconds per second."""
     if not LEAST <= factor <= 1.0 / LEAST:
         raise Refused(f"real_time_factor: {factor!r} is not allowed; allowed: {LEAST:g} to {1.0 / LEAST:g}")
 
@@ -26,7 +26,7 @@ class Running:
     """How a plant runs."""
 
     accuracy: float = ACCURACY  # of its integrator
-    real_time_factor: float = 0.0  # simulated seconds in a second of wall time; 0: lockstep
+    real_time_factor: float = 0.0  # simulated seconds per second of wall time; 0: lockstep
     # By side, in a free run: simulated time in s without a command, and what then acts: "hold" the last command, "zero"
     # force, or "stop" the run.
     timeouts: Mapping[str, float] = field(default_factory=dict)
@@ -54,8 +54,8 @@ class Running:
         if self.lockstep:
             return "lockstep"
         silence = sorted({f"{self.reactions[side]} after {seconds:g} s" for side, seconds in self.timeouts.items()})
-        without = f"; without commands {' or '.join(silence)}" if silence else ""
-        return f"free-running, {self.real_time_factor:g} s in a second{without}"
+        without = f"; on timeout: {' or '.join(silence)}" if silence else ""
+        return f"free-running, {self.real_time_factor:g} s per second{without}"
 
     def to_yaml(self) -> str:
         """As YAML; `parse` of it gives the same."""

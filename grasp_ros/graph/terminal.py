@@ -103,7 +103,7 @@ class View:
 
     def _energy(self, level: Mapping[str, float], width: int) -> list[RenderableType]:
         if np.isnan(level.get("V_plant", np.nan)):
-            return [Text("energy and contacts: not known without lyapunov")]
+            return [Text("energy and contacts: no messages on lyapunov")]
         closed, bar = level.get("closed") == 1.0, max(width - 50, 6)
         names = ("V_c", "V") if closed else ("V_plant",)
         table = Table(box=None, padding=(0, 1 if width < NARROW else 2), show_header=False, pad_edge=width >= NARROW)
@@ -115,7 +115,7 @@ class View:
             table.add_row(name, f"{value:.6g} J", Text("█" * filled, style="green" if closed else "yellow"))
         table.add_row("contact", CONTACT.get(level["mode"], UNKNOWN), "")
         table.add_row("balance", BALANCE.get(level["alarm"], UNKNOWN), "")
-        return [table] if closed else [table, "V: no law is announced, or another one ran"]
+        return [table] if closed else [table, "V: law unknown, or not the announced one"]
 
 
 class Key(Enum):

@@ -33,11 +33,11 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
     ----------
     data : path, Recording or Trajectory
         A bag, a .npz file of `grasp simulate`, or a .csv file with columns as `Trajectory.to_csv` names them: `t_s`,
-        and states, not all of which need be there. Inputs that were recorded at every tick act as they were, if no
-        free number belongs to what gives them; otherwise the controllers of the scene act.
+        and states, not all of which need be there. Inputs recorded at every tick act as recorded, unless a free
+        number belongs to a controller or an external force; then the scene's controllers act.
     free : sequence of str
         "section.key" of numbers that enter smoothly: masses, stiffness, damping, H, p, gains, initial values.
-        "offset.x_left_m" is the offset of a sensor, in what it measures minus what is.
+        "offset.x_left_m" is the offset of a sensor: measured minus true value.
     scene : Scene, optional
         What is known, and the start of what is free. Default: the scene of the data; a .csv file has none.
     against : mapping of str to float

@@ -111,8 +111,8 @@ def search(problem: FitProblem) -> Array:
             break
     if not math.isfinite(least):
         start = ", ".join(f"{key} {value:g}" for key, value in problem.values(begin).items())
-        raise Refused(f"{problem.data.name}: {start}: no motion of {problem.scene.name} gets from there to its end;"
-                      " allowed: another start")
+        raise Refused(f"{problem.data.name}: {start}: with these starts no run of {problem.scene.name} reaches its end;"
+                      " allowed: others")
     return best
 
 

@@ -57,15 +57,15 @@ class Axis(NamedTuple):
 def read_axis(option: str, text: str, grid: bool = True) -> Axis:
     """An axis from "section.key[+section.key]=low:high[:n[:log]]"; n only of a grid. Another text is refused."""
     allowed = (
-        "allowed: section.key=low:high, keys of one value joined by +, :n behind it for 2 to"
-        f" {MOST:,} values, and :log behind that for a scale > 0"
+        "allowed: section.key=low:high, + between keys with one value; then :n for 2 to"
+        f" {MOST:,} values; then :log for a log scale"
     )
     match = re.fullmatch(r"([\w.+]+)=([^:]+):([^:]+)(?::(\d*)(?::(log))?)?", text)
     if match is None:
         raise Refused(f"{option} {text}: not understood; {allowed}")
     name, low, high, points, log = match.groups()
     if points and not grid:
-        raise Refused(f"{option} {text}: there is no grid of {points} values; allowed: low:high, and ::log behind it")
+        raise Refused(f"{option} {text}: n={points} is for a map's axes; allowed: low:high or low:high::log")
     try:
         return Axis(name, read_number(low), read_number(high), int(points or POINTS), bool(log))
     except ValueError:
@@ -155,7 +155,7 @@ def check(plan: Plan) -> None:
                           " logarithmic")
         parameter = parameter_of(plan.scene, key)
         if parameter.whole:
-            raise Refused(f"{plan.scene.name}: {key}: a whole number; allowed: numbers with a range")
+            raise Refused(f"{plan.scene.name}: {key}: takes whole numbers; allowed: real-valued")
         for end in (axis.low, axis.high):
             if not parameter.accepts(end):
                 raise Refused(f"{plan.scene.name}: {key}: {end!r} is not allowed; allowed: {parameter.allowed}")

@@ -69,7 +69,7 @@ class Store:
                 for name, values in {**chunk.columns, STATUS: chunk.status}.items():
                     self._group[name][part] = values.reshape(-1, *self.plan.shape[1:])
         except Refused as error:
-            raise Refused(f"{error}; what is done is kept: the same command goes on") from None
+            raise Refused(f"{error}; results are kept: the same command resumes") from None
 
 
 def _create(path: Path, plan: Plan, document: dict[str, Any], height: int) -> None:

@@ -95,8 +95,8 @@ def check(
 ) -> float:
     """The setting of a method, if it can do what is asked; the one place that refuses what it cannot.
 
-    No setting is the method's default, or the whole horizon as a step if that is shorter; another budget of work than
-    MAX_WORK is one that someone has set.
+    Without a setting: the method's default, or the whole horizon as the step if that is shorter. A `max_work` other
+    than MAX_WORK counts as set.
     """
     method = find(name)
     value = method.default if setting is None else number(f"{name}: {method.knob}", setting)

@@ -162,7 +162,7 @@ def costs(problem: DesignProblem, parts: Array) -> Array:
 
 
 def front(problem: DesignProblem, seed: int = 0, progress: Told | None = None) -> list[Design]:
-    """Choices none of which is better than another in both outcomes of a problem, from the first outcome's best on.
+    """The Pareto front of the two outcomes of a problem, from the first outcome's best on.
 
     Each has the smallest first outcome for a bound on the second one; the bounds are even between the two ends. Of
     choices that are equal in both the first is kept. See `search`.

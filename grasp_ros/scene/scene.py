@@ -141,7 +141,7 @@ class Scene(Frozen):
 
     def why_unsettled(self, sampled: bool) -> str:
         """Why V_c may not prove that a run settles."""
-        return self.certificate_in_words(sampled) if self.caveats(sampled) else "a mass may not be driven to 0"
+        return self.certificate_in_words(sampled) if self.caveats(sampled) else "a mass need not return to 0"
 
     def time_of(self, tick: int) -> float:
         """Time of a tick in s: an integer number of ns, rounded once."""

@@ -36,7 +36,7 @@ def check_keys(source: str, prefix: str, found: Mapping[Any, Any], allowed: Sequ
     for key in needed:
         if key not in found:
             optional = ", ".join(key for key in allowed if key not in needed)
-            every = f"the keys {', '.join(needed)}" + (f" and, where wanted, {optional}" if optional else "")
+            every = f"the keys {', '.join(needed)}" + (f"; optional: {optional}" if optional else "")
             raise SceneError(f"{source}: {prefix}{key}: missing; allowed: {every}")
 
 

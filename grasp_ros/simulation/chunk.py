@@ -43,7 +43,7 @@ LEFT_OUT = -2  # in place of why a row ended
 
 
 class Setup(NamedTuple):
-    """What the rows of an ensemble depend on, beside the scene and its numbers.
+    """Settings of the runs of an ensemble, besides the scene and its numbers.
 
     Attributes
     ----------

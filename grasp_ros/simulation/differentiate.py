@@ -38,7 +38,7 @@ class Sensitivity(Frozen):
     ----------
     scene : Scene
     keys : tuple of str
-        The numbers, "section.key"; each derivative is by the unit of its key.
+        The numbers, "section.key"; derivatives are per unit of the key.
     t : array (m,), s
     state : array (m, 6), m and m/s
         As `simulate` gives it; NaN for a body that is not there.

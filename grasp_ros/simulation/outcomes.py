@@ -68,9 +68,9 @@ def _peak(q: int) -> Callable[[Runs], Array]:
 
 _GROUPS: dict[str, tuple[Outcome, ...]] = {
     "settling_time": (Outcome(
-        "settling_time", "s", "from then on no mass leaves the bound, a part of the largest initial displacement, for"
-        " good: V_c proves it, for which the run goes on; inf: not within so many horizons; nan: V_c proves nothing"
-        " where it can rise, or where a mass is not driven to 0", Wanted.SETTLING, _column("seen", Seen.SETTLED)),),
+        "settling_time", "s", "after it no mass leaves the bound, a fraction of the largest initial displacement: V_c"
+        " proves it, for which the run continues; inf: not proved within the horizons; nan: no proof, because V_c can"
+        " rise or a mass is not driven to 0", Wanted.SETTLING, _column("seen", Seen.SETTLED)),),
     "settling_times": tuple(
         Outcome(f"settling_time_{name}", "s", f"the same of the {name} mass alone, where all settle", Wanted.SETTLING,
                 _settled(body)) for body, name in NAMES.items()),

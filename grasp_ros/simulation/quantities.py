@@ -76,8 +76,8 @@ def as_row(run: Trajectory, *outcomes: str, horizons: int = HORIZONS) -> dict[st
 def settling_times(run: Trajectory, horizons: int = HORIZONS) -> Array:
     """When left arm, object and right arm settled for good, (3,) in s.
 
-    Infinite: V_c does not prove it within so many horizons, for which an exact run goes on, or within the output times
-    of any other. nan: V_c proves nothing, because it can rise here, or bounds no mass that is not driven to 0.
+    Infinite: not proved by V_c within `horizons`, up to which an exact run continues, or within the output times of
+    any other. nan: no proof, because V_c can rise here, or some mass is not driven to 0.
     """
     if not may_settle(check_run(run)):
         return np.full(3, np.nan)

@@ -67,11 +67,11 @@ class Trajectory(Tabular, Frozen):
     controllers : mapping of str to str
         Names of the controllers that acted in place of the scene's feedback, by side.
     at_rest : float or None
-        Time in s since when everything is at rest for good, see `exact.driver.rest`; only `exact` tells, and not of
-        held commands, of which another one may follow.
+        Time in s from which everything stays at rest, see `exact.driver.rest`. None: never, by another method, or
+        under held commands, which may change.
     sensitivity : Sensitivity or None
-        Derivatives of the motion, where `simulate` was asked for them; see `differentiate.Sensitivity`. They belong to
-        no file.
+        Derivatives of the motion, where `simulate` was asked for them; see `differentiate.Sensitivity`. They are
+        not saved.
     """
 
     scene: Scene
@@ -138,8 +138,8 @@ class Trajectory(Tabular, Frozen):
     def energy_of(self) -> str:
         """What `energy` is the energy of: the plant with its feedback, or the plant alone.
 
-        Nobody knows the energy of a controller that is any function: then V and V_c have no term of feedback, of
-        neither side, and V' is the rate without any command.
+        The energy of a user's controller is unknown: with one, V and V_c have no feedback term on either side, and
+        V' is the rate without commands.
         """
         return PLANT_ALONE if self.controllers else PLANT_AND_FEEDBACK
 
@@ -178,7 +178,7 @@ class Trajectory(Tabular, Frozen):
         Raises
         ------
         Refused
-            If a time is none, or outside the run, or the run cannot be repeated.
+            If a time is NaN or outside the run, or the run cannot be repeated.
         """
         return states_at(self, times("t", t, several=True))
 
@@ -202,8 +202,8 @@ class Trajectory(Tabular, Frozen):
         and -u' at the release in m/s, and `restitution`, their quotient; `peak_force` in N, `impulse` in N s, `loss`,
         the energy that the contact took, in J, and `deepest`, the largest u in m. A contact that goes on at the end of
         the run ends there, and has NaN for speed_out and restitution; so has one that was there at the begin for
-        speed_in. Peaks and integrals are those of polynomials that follow the states to 1e-12 and to their rounding,
-        which a u that is small beside the positions feels.
+        speed_in. Peaks and integrals come from polynomials that follow the states to 1e-12 and to rounding, which
+        matters where u is much smaller than the positions.
 
         Raises
         ------
@@ -216,11 +216,11 @@ class Trajectory(Tabular, Frozen):
         """Where a function of the motion crosses a level: times, states and directions.
 
         Between its events a motion is smooth. There the function is replaced by polynomials that follow it to 1e-12 of
-        its largest value in the run, and all roots of these are found. Each is a crossing if the function has other
-        signs on both sides of it, and its time is then that of the function itself, to rounding. So no crossing is
-        missed but where the function comes beyond the level by less than that. Where the function, or the motion at a
-        reversal under dry friction, is not smooth by itself, it is followed in ever smaller pieces;
-        `Section.resolution` is the length of the longest that is left, within which crossings may be missed in pairs: 0
+        its largest value in the run, and all roots of these are found. Each is a crossing if the function changes
+        sign there; its time is then refined on the function itself, to rounding. A crossing is missed only where
+        the function passes the level by less than that 1e-12. Where the function, or the motion at a
+        reversal under dry friction, is not smooth, the pieces are halved; `Section.resolution` is the length of the
+        longest that stays unresolved, within which pairs of crossings may be missed: 0
         for a linear function of a motion without friction.
 
         Parameters
@@ -235,7 +235,7 @@ class Trajectory(Tabular, Frozen):
         Raises
         ------
         Refused
-            If the function or the direction is none, or the run cannot be repeated, see `at`.
+            If the function or direction is invalid, or the run cannot be repeated, see `at`.
         """
         return crossings(as_function(function, number("level", level)), direction, breaks_of(self), self.at)
 

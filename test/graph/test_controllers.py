@@ -55,7 +55,7 @@ def test_a_controller_that_we_did_not_write_is_recorded_and_verified(
     assert np.isnan(named["V"]).all()
     assert np.isfinite(named["V_plant"]).all()
     assert np.abs(np.diff(named["V_plant"]) - named["work"][1:] - named["unexplained"][1:]).max() < 1e-12
-    assert all(law.startswith("foreign: ") for law in laws_of(recording).values())
+    assert all(law.startswith("not the scene's law: ") for law in laws_of(recording).values())
     assert "of the plant alone" in out
     assert "601 states follow" in out
     assert "NOT EQUAL" not in out

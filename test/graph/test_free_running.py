@@ -54,7 +54,7 @@ def test_a_controller_at_its_own_rate_is_held_recorded_and_verified(
     assert run.returncode == 0, out + err
     assert time.monotonic() - begin > 3.0  # half as fast as the clock
     recording = bag.read(tmp_path / "run" / "bag")
-    assert recording.running.words == "free-running, 0.5 s in a second; without commands zero after 0.1 s"
+    assert recording.running.words == "free-running, 0.5 s per second; on timeout: zero after 0.1 s"
     assert recording.tick.tolist() == list(range(1501))
     assert verify(recording).holds
     assert 3 < len(np.unique(recording.effort[:, 0])) < 200  # held over many periods
@@ -75,7 +75,7 @@ def test_a_silent_controller_has_the_declared_reaction(launch: Any, reaction: st
     errors = plant.communicate(timeout=DEADLINE)[1]
     assert "%|" not in errors  # no bar of progress where no terminal is
     assert plant.returncode == status
-    assert f"left: no command that answers a state of the last 0.25 s, at tick 250: {reaction}" in errors
+    assert f"left: no command newer than 0.25 s at tick 250; reaction: {reaction}" in errors
     assert ("finished 20000 ticks" in errors) is (reaction == "zero")
 
 
@@ -155,8 +155,8 @@ def test_a_slow_controller_answers_the_newest_state_and_its_age_is_shown(
     assert run.returncode == 1
     assert not re.search("Hz: [^;]*(/diagnostics|timing)", out)  # they go by wall time
     assert f"grasp: --max-age 1: the oldest command was {most:g} periods old" in err
-    assert f"grasp: --min-factor 2.5: {recording.reached:.3g} s in a second was reached" in err
-    words = f"{recording.reached:.3g} s in a second, {recording.overruns} overruns, "
+    assert f"grasp: --min-factor 2.5: {recording.reached:.3g} s per second was reached" in err
+    words = f"{recording.reached:.3g} s per second, {recording.overruns} overruns, "
     for text in (out, command("inspect", "run/bag").stdout):
         assert words in text
         assert f"left at most {most:.0f} periods, 99 % at most {usual:.0f}" in text
@@ -181,7 +181,7 @@ def test_a_bag_tells_for_how_long_a_command_was_missing(grasp_run: Any, tmp_path
     (tmp_path / "hangs.py").write_text(HANGS)
     run = grasp_run(*THREE_SECONDS, "--free-running", "1", "--controller", "left=hangs:law")
     out, err = run.communicate(timeout=DEADLINE)
-    assert "no command that answers a state of the last 0.1 s" in err
+    assert "no command newer than 0.1 s" in err
     late = bag.read(tmp_path / "run" / "bag").timed_out["left"]
     assert 300 < late < 2500
     for text in (out, command("inspect", "run/bag").stdout):
@@ -217,5 +217,5 @@ def test_a_free_run_has_a_priority_or_says_why_not(grasp_run: Any, tmp_path: Pat
     nodes = children(tmp_path)
     found = {name: os.sched_getscheduler(pid) for name, pid in nodes.items()}
     run.terminate()
-    given = "real-time priority is not to be had here" not in run.communicate(timeout=DEADLINE)[1]
+    given = "real-time priority is not available here" not in run.communicate(timeout=DEADLINE)[1]
     assert found == {name: os.SCHED_RR if given and name != "monitor" else os.SCHED_OTHER for name in nodes}

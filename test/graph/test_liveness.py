@@ -56,9 +56,9 @@ def test_who_waits_says_for_whom_and_goes_on_when_it_is_back(launch: Any, tmp_pa
     (tmp_path / "scene.yaml").write_text(scene.load("case_01", ["time.duration_s=3600"]).to_yaml())
     graph = Terminals(launch, tmp_path, str(tmp_path / "scene.yaml"))
     needs = {  # who misses a message of the first
-        "left_controller": ("plant", r"effort_command: no (sign of life|answer).* of /left_controller for 1\.\d s"),
-        "monitor": ("plant", r"lyapunov: no (sign of life|answer).* of /monitor for 1\.\d s"),
-        "plant": ("right_controller", r"joint_states: no sign of life of /plant for 1\.5 s"),
+        "left_controller": ("plant", r"effort_command: no (heartbeat|answer).* of /left_controller for 1\.\d s"),
+        "monitor": ("plant", r"lyapunov: no (heartbeat|answer).* of /monitor for 1\.\d s"),
+        "plant": ("right_controller", r"joint_states: no heartbeat of /plant for 1\.5 s"),
     }
     for name, (other, words) in needs.items():
         graph.processes[name].send_signal(signal.SIGSTOP)
@@ -67,9 +67,9 @@ def test_who_waits_says_for_whom_and_goes_on_when_it_is_back(launch: Any, tmp_pa
         graph.processes[name].send_signal(signal.SIGCONT)
         wait_for(lambda other=other: "is back after" in graph.said(other).split("keeps waiting")[-1], "its end")
         wait_for(lambda other=other: levels().get(f"/{other}") == DiagnosticStatus.WARN, "a warning from then on")
-        assert "this process was stopped for" in graph.said(name)
+        assert "this node was suspended for" in graph.said(name)
     graph.processes["right_controller"].kill()
-    graph.wait_for("plant", r"right/effort_command: no (sign of life|answer).* of /right_controller for 1\.\d s")
+    graph.wait_for("plant", r"right/effort_command: no (heartbeat|answer).* of /right_controller for 1\.\d s")
     launch(*START, "right_controller", "--ros-args", "-p", "wait_for_monitor:=true", stderr=subprocess.DEVNULL)
     wait_for(lambda: "right/effort_command: is back after" in graph.said("plant"), "the one in its place")
     more_ticks(graph.file)
@@ -83,14 +83,14 @@ def test_who_waits_says_for_whom_and_goes_on_when_it_is_back(launch: Any, tmp_pa
 
 
 FAULTS = [  # and the last sentence, in the words of the first that has noticed
-    ("left_controller", signal.SIGSTOP, r"left/effort_command: no (sign of life|answer).* of /left_controller for 1"
-     r"|left_controller: was stopped"),
+    ("left_controller", signal.SIGSTOP, r"left/effort_command: no (heartbeat|answer).* of /left_controller for 1"
+     r"|left_controller: was suspended"),
     ("monitor", signal.SIGKILL, r"monitor: was killed by SIGKILL"),
-    ("plant", signal.SIGSTOP, r"joint_states: no sign of life of /plant for 1\.5 s|plant: was stopped"),
+    ("plant", signal.SIGSTOP, r"joint_states: no heartbeat of /plant for 1\.5 s|plant: was suspended"),
     ("plant", signal.SIGTERM, r"plant: was ended by SIGTERM"),
     pytest.param("right_controller", signal.SIGINT, r"right_controller: was ended by SIGINT",
                  marks=pytest.mark.thorough),
-    ("together", signal.SIGSTOP, r"graph: was stopped, and did not go on for 1\.5 s"),
+    ("together", signal.SIGSTOP, r"graph: was suspended for more than 1\.5 s"),
 ]
 
 
@@ -186,7 +186,7 @@ def test_who_is_busy_was_not_stopped(launch: Any, tmp_path: Path) -> None:
     controller = launch(*node_command("left_controller", law="mine:law"), cwd=tmp_path, stderr=subprocess.PIPE)
     assert plant.wait(DEADLINE) == 0
     controller.terminate()
-    assert "this process was stopped" not in controller.communicate(timeout=DEADLINE)[1]
+    assert "this node was suspended" not in controller.communicate(timeout=DEADLINE)[1]
 
 
 def test_who_prepares_is_waited_for_and_who_does_not_come_is_not(context: rclpy.Context) -> None:
@@ -202,7 +202,7 @@ def test_who_prepares_is_waited_for_and_who_does_not_come_is_not(context: rclpy.
     assert not controller.finished
     end_nodes(other)
     wait_for(lambda: executor.spin_once(timeout_sec=0.1) or controller.finished, "its end")
-    assert "in vain for 1.6 s" in controller.words
+    assert "timeout of 1.6 s" in controller.words
     executor.shutdown()
     end_nodes(controller)
 
@@ -255,7 +255,7 @@ def test_who_stands_because_another_was_stopped_says_so_and_ends(launch: Any, tm
     plant.send_signal(signal.SIGSTOP)
     _, err = controller.communicate(timeout=DEADLINE)
     assert controller.returncode == 1
-    assert re.search(r"\[FATAL\] \[left_controller\]: blocked for \d+\.\d s: /plant was stopped\n", err), err
+    assert re.search(r"\[FATAL\] \[left_controller\]: blocked for \d+\.\d s: /plant suspended\n", err), err
 
 
 def test_one_that_has_just_come_is_not_silent_as_the_one_before_it(node: tuple[Any, SingleThreadedExecutor]) -> None:

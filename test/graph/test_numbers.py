@@ -171,7 +171,7 @@ def test_a_tick_that_cannot_be_true_is_refused_and_left_out_of_what_is_recovered
     with pytest.raises(bag.BagError, match=words):
         bag.read(tmp_path / "bag")
     found = recover(tmp_path / "bag", tmp_path / "new")
-    assert [left.partition(":")[0] for left in found.left_out] == ["something of 1 ticks, the first 5"]
+    assert [left.partition(":")[0] for left in found.left_out] == ["parts of 1 ticks, the first 5"]
     assert found.missing == "5"
     assert bag.read(tmp_path / "new").tick.tolist() == [tick for tick in range(11) if tick != 5]
 

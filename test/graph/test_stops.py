@@ -286,7 +286,7 @@ def test_a_monitor_without_a_plant_leaves_nothing(tmp_path: Path) -> None:
     """It has looked whether its bag can be written; `grasp run` would take a directory for the begin of the bag."""
     numbers = {"bag": "new/bag", "peer_timeout_s": "0.1", "start_timeout_s": "0.1", "on_silence": "end"}
     found = ran(*node_command("monitor", **numbers), cwd=tmp_path)
-    assert "in vain for 0.1 s" in found.stderr
+    assert "timeout of 0.1 s" in found.stderr
     assert not [*tmp_path.iterdir()]
 
 

@@ -219,7 +219,7 @@ def test_a_graph_that_slept_as_a_whole_goes_on(launch: Any, tmp_path: Path) -> N
     for process in processes:
         process.send_signal(signal.SIGCONT)
     more_ticks(graph.file)
-    assert "this process was stopped for" in graph.said()
+    assert "this node was suspended for" in graph.said()
     for process in processes:
         process.send_signal(signal.SIGINT)
     assert [process.wait(DEADLINE) for process in processes] == [0, 0, 0, 0], graph.said()

@@ -119,7 +119,7 @@ def time_in(picture: str) -> float:
 def test_keys_pause_step_and_end_a_bag(launch: Any, path: Path) -> None:
     recording = bag.read(path)
     screen = Screen(launch, *watch(path, "--rate", "0.05", "--from", "1.5"))
-    assert time_in(screen.wait("0.05 s in a second")) == pytest.approx(1.5, abs=0.1)
+    assert time_in(screen.wait("0.05 s per second")) == pytest.approx(1.5, abs=0.1)
     assert not screen.as_before
     screen.press(b" ")
     at = time_in(screen.wait("paused"))
@@ -128,7 +128,7 @@ def test_keys_pause_step_and_end_a_bag(launch: Any, path: Path) -> None:
         picture = screen.wait(rf"t = {at + 0.001 * ticks:.3f} s   paused")
         assert f"{recording.state[round(1000 * at) + ticks, 0]:+.5f}" in picture
     screen.press(b" ")
-    screen.wait("0.05 s in a second")
+    screen.wait("0.05 s per second")
     screen.press(b"q")
     assert screen.end() == 0
 

@@ -35,7 +35,7 @@ def test_a_process_that_stands_behind_a_stopped_one_says_so_and_ends(monkeypatch
     assert not clock.ended
     clock.beat(1)
     assert clock.ended == [1]
-    assert capsys.readouterr().err == "[FATAL] [monitor]: blocked for 2.4 s: /plant was stopped\n"
+    assert capsys.readouterr().err == "[FATAL] [monitor]: blocked for 2.4 s: /plant suspended\n"
 
 
 def test_one_that_waits_on_says_it_at_once_and_now_and_then(monkeypatch: Any, capsys: Any) -> None:

@@ -227,7 +227,7 @@ def test_a_full_disk_is_refused_and_what_was_done_is_kept(tmp_path: Path, tiny_c
         [sys.executable, "-c", code, json.dumps(plan.to_document()), str(path)], capture_output=True, text=True,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (8, 8)), check=True, timeout=DEADLINE_S,
     )
-    assert "cannot be written: File too large; what is done is kept: the same command goes on" in answer.stdout
+    assert "cannot be written: File too large; results are kept: the same command resumes" in answer.stdout
     run(plan, path)
     run(plan, tmp_path / "whole.zarr")
     assert_same(path, tmp_path / "whole.zarr")
@@ -305,7 +305,7 @@ def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureF
         (["--x", f"{GAIN}=1:2", "--outcome", "joy"], "outcome joy: not known; allowed: settling_time"),
         (["--vary", f"{GAIN}=1:2"], "--vary: allowed: with --sample N"),
         (["--x", f"{GAIN}=1:2:2", "--seed", "1"], "--seed: allowed: with --sample N"),
-        (["--x", f"{GAIN}=1:2:3", "--sample", "9"], "there is no grid of 3 values; allowed: low:high, and ::log"),
+        (["--x", f"{GAIN}=1:2:3", "--sample", "9"], "n=3 is for a map's axes; allowed: low:high or low:high::log"),
         (["--x", f"{GAIN}=1:2", "--settled", "2"], "settled: 2.0"),
         (["--x", f"{GAIN}=1:2:99999", "--y", "object.mass_kg=1:2:99999"], "axes: 9,999,800,001 runs; allowed: at most"),
         (["--x", f"{GAIN}=1:2:2", "--scheduler", "tcp://127.0.0.1:9"], "nobody answers"),

@@ -93,8 +93,8 @@ class UserController:
         except NumbaError as error:
             lines = [line.strip() for line in COLOUR.sub("", str(error)).splitlines()]
             why = next((line for line in lines if line and not line.startswith(BESIDE)), type(error).__name__)
-            raise Refused(f"controllers: {side}: {self.name} cannot be compiled for a whole number and three floats,"
-                          f" with a float as its answer: {why}") from None
+            raise Refused(f"controllers: {side}: {self.name} cannot be compiled as"
+                          f" float(int, float, float, float): {why}") from None
         self._function = function  # which must not go before the address does
         self.address: int = function.address if compiled else ctypes.cast(function, ctypes.c_void_p).value or 0
 

@@ -200,7 +200,7 @@ class Recording(Tabular, Frozen):
 
     @property
     def reached(self) -> float:
-        """Simulated seconds in a second that a free run has reached, without pauses; NaN if it has not said it."""
+        """Simulated seconds per second that a free run has reached, without pauses; NaN if it has not said it."""
         return float(self.timing["reached"][-1]) if "reached" in self.timing else math.nan
 
     @property

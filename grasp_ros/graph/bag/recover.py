@@ -51,7 +51,7 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
             written += 1
     finally:
         left_out = [f"{size} bytes from byte {offset} on: {why}" for offset, size, why in opened.storage.left_out]
-        left_out += [f"something of {len(at)} ticks, the first {at[0]}: {why}" for why, at in refused.items()]
+        left_out += [f"parts of {len(at)} ticks, the first {at[0]}: {why}" for why, at in refused.items()]
         recorder.close({"recovered from": str(path), "what was left out": "; ".join(left_out) or "none"})
     return Recovery(written, left_out, recorder.gaps)
 

@@ -112,7 +112,7 @@ class Answers(NamedTuple):
         if self.lost:
             return f"not known: the bag lacks {self.lost} announcements of its numbers"
         others = f"{self.commands - self.own} of {self.commands} commands on {self.topic}"
-        return f"foreign: {others} are not those of the scene's law"
+        return f"not the scene's law: {others} differ"
 
 
 def answers_of(recording: Recording) -> dict[str, Answers]:

@@ -85,7 +85,7 @@ class PeerNode(GraspNode):
         """What this node needs of others now that it has begun."""
 
     def standing(self) -> float | None:
-        """How long its thread may stand, in a law that does not return, say, in s; None: for ever, before it begins."""
+        """Time in s that its thread may be blocked, as by a law that does not return; None: any, before it begins."""
         return self.start_patience if self.begun else None
 
     @abstractmethod
@@ -107,7 +107,7 @@ class PeerNode(GraspNode):
         if self._watchdog.resumed > self._excused:
             self._excused = self._watchdog.resumed
             if self.begun and not self.finished:
-                self.get_logger().warning(f"this process was stopped for {self._watchdog.stood:.1f} s")
+                self.get_logger().warning(f"this node was suspended for {self._watchdog.stood:.1f} s")
         if not self._first_look:
             self._first_look = now
             self.heartbeats.own.ready = True
@@ -133,7 +133,7 @@ class PeerNode(GraspNode):
         waited = now - max(self._first_look, self.heartbeats.prepared)
         self.concern = f"for {waited:.0f} s" if waited > self.patience else ""
         if waited > self.start_patience and self._ends:
-            self.fail(f"{self.words}: in vain for {self.start_patience:g} s")
+            self.fail(f"{self.words}; timeout of {self.start_patience:g} s")
 
     def _trouble_with(self, need: Need, now: float) -> Trouble | None:
         """What is wrong with a topic; None if all is well."""
@@ -156,14 +156,14 @@ class PeerNode(GraspNode):
                 patience *= SLOW
                 quiet = self.heartbeats.quiet(names, now - patience) if self._excused < now - patience else []
             if quiet:
-                words = f"{need.topic.name}: no sign of life of {' and '.join(quiet)} for {patience:g} s"
+                words = f"{need.topic.name}: no heartbeat of {' and '.join(quiet)} for {patience:g} s"
                 return Trouble(words, True)
         late = now - max(need.due, self._excused)
         if late > self.patience:
             living = bool(self.heartbeats.of(names))  # it may be slow, or compile for its first answer
             limit = (self.start_patience if need.first else SLOW * self.patience) if living else self.patience
             words = f"{need.topic.name}: no {need.what} of {' and '.join(names)} for {min(late, limit):.1f} s"
-            return Trouble(f"{words}, although it lives" if living else words, late > limit)
+            return Trouble(f"{words}, only heartbeats" if living else words, late > limit)
         return None
 
     def _note(self, need: Need, trouble: Trouble | None, now: float) -> None:
@@ -199,7 +199,7 @@ class PeerNode(GraspNode):
         return self.heartbeats.living(self.sources(topic), time.monotonic() - self.patience)
 
     def on_text(self, topic: Topic, take: Callable[[str], None]) -> None:
-        """Subscribe to a text; it counts when a living node vouches for it, or when nobody here says such texts."""
+        """Subscribe to a text; accepted if a living node sends its digest, or if no node sends digests."""
         self._texts[topic], self._takers[topic] = [], take
         self.subscribe(topic, partial(self._on_text, topic))
 

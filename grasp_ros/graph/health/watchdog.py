@@ -21,13 +21,13 @@ PAUSE_SECONDS = 2.0 * HEARTBEAT_SECONDS  # between two beats, if the process was
 
 
 class Watchdog:
-    """Notices in a thread of its own that the nodes' thread stands: in a law that does not return, or in DDS.
+    """A thread that notices when the nodes' thread is blocked: in a law that does not return, or in DDS.
 
     A process that is stopped just while it holds a lock of shared memory stops those that wait for the lock as well, in
     the middle of a call of DDS. So the sentence goes to the terminal alone: a log of ROS goes through DDS.
 
-    It may stand as long as `standing` says, None being for ever; as long as `patience` while a node of this machine is
-    stopped, which `frozen` names. If it `ends`, the process does not outlive that.
+    It may be blocked for `standing()` s, None: for ever; for `patience` s while a node of this machine is suspended,
+    which `frozen` names. After that the process ends, if `ends`.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class Watchdog:
         if not frozen and not (self._ends and seconds > most):
             return
         frame = sys._current_frames()[threading.main_thread().ident or 0]  # in which the nodes are
-        why = f"{frozen} was stopped" if frozen else f"in {frame.f_code.co_filename}, line {frame.f_lineno}"
+        why = f"{frozen} suspended" if frozen else f"in {frame.f_code.co_filename}, line {frame.f_lineno}"
         name = self._name if frozen else _node_of(frame) or self._name
         if self._beaten - self._said > EVERY_SECONDS:
             self._said = self._beaten

@@ -1,8 +1,8 @@
 """What a plant and a monitor admit: commands that can be true, of a source that is known, up to where the monitor is.
 
-Who sent a message is not known to whoever gets it. But a reader knows how many writers it has ever been connected with,
-and a writer is connected before its first message comes. So while that number stands, all messages come from the same
-source; what comes when it has just changed may come from another one, also if that has already left.
+A message does not name its sender. But a reader knows how many writers it has ever been connected with,
+and a writer is connected before its first message comes. So while that number is constant, all messages come from the
+same source; a message just after a change may come from another one, even from one that has already left.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from grasp_ros.scene.topics import CHANGES, COMMANDS, Topic
 class Limits:
     """The largest forces that act, as the scene and the announcements of its controllers have them.
 
-    The package's own controllers keep to the limit. A command of another one that does not is neither taken nor cut:
-    the actuator would not do it, and nobody has computed what it would do instead.
+    The package's own controllers keep to the limit. A larger command of another controller is refused, not clipped:
+    the actuator could not apply it, and no controller has computed a clipped one.
     """
 
     def __init__(self, node: GraspNode, scene: Scene) -> None:

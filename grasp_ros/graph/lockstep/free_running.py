@@ -192,7 +192,7 @@ class FreeRunning:
         self._plant.count("timeouts")
         reaction = self._running.reactions[side]
         age = self._running.timeouts[side]
-        words = f"{side}: no command that answers a state of the last {age:g} s, at tick {self._plant.tick}: {reaction}"
+        words = f"{side}: no command newer than {age:g} s at tick {self._plant.tick}; reaction: {reaction}"
         if reaction == "stop":
             self._plant.fail(words)
             return
@@ -241,7 +241,7 @@ class Timing:
     def take(self) -> dict[str, float]:
         """What was collected since the last call, by name; nothing where there was no period.
 
-        `reached` are the simulated seconds in a second since the start, without pauses; `period_s` is the mean
+        `reached` are the simulated seconds per second since the start, without pauses; `period_s` is the mean
         interval, `jitter_s` its standard deviation, `late_p99_s` how late the periods were computed, `overruns` how
         many were later than a whole period since the start, and `left_age_p99` and so on the age of the commands in
         periods; `left_age_p99_all` and `left_age_max_all` are those since the start, and `left_timed_out_all` in how

@@ -56,7 +56,7 @@ class Lockstep:
         for sources in self._sources.values():
             sources.begin()
         found = {topic.name: self._plant.living(topic) for topic in self.topics}
-        return [f"{name} from one source alone, not {' and '.join(nodes)}" if nodes else name
+        return [f"{name} from one publisher, not {' and '.join(nodes)}" if nodes else name
                 for name, nodes in found.items() if len(nodes) != 1]
 
     def start(self) -> None:
@@ -168,4 +168,4 @@ class Lockstep:
         words = [f"{name}: {len(nodes)} sources, {' and '.join(nodes)}" for name, nodes in found.items()
                  if len(nodes) > 1]
         self._plant.fail(f"{'; '.join(words) or 'a command topic had two sources'};"
-                         " allowed in lockstep: one, or who answers first would decide")
+                         " allowed in lockstep: one; else the result depends on timing")

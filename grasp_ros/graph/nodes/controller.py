@@ -88,7 +88,7 @@ class Controller(PeerNode):
                 raise
             self._left = None  # a living plant is no reason to go on with the last scene
             self.phase, self.words = Phase.IDLE, f"waits for another scene: {error}"
-            self.concern = "this scene is not answered"
+            self.concern = "no command in this scene"
             self.get_logger().error(self.words)
             return
         if self._ready_to_answer:  # this node stays; those that listen may be new

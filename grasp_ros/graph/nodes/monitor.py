@@ -120,7 +120,7 @@ class Monitor(PeerNode):
         super().heard()
         self.finished = self.finished or self._is_over()
         if self._plant and not self.finished and (other := self.heartbeats.successor(self._plant)):
-            self.fail(f"{JOINT_STATES.name}: another {other} has taken the place of the one that is recorded")
+            self.fail(f"{JOINT_STATES.name}: another {other} has replaced the recorded one")
 
     def fail(self, reason: str, status: int = 1) -> None:
         """End with a sentence that says how far the bag reaches."""

@@ -158,7 +158,7 @@ class Plant(PeerNode):
 
     def _ready(self) -> bool:
         strange = self._insist()
-        missing = [f"{JOINT_STATES.name} from one source alone, not {' and '.join(strange)}"] if strange else []
+        missing = [f"{JOINT_STATES.name} from one publisher, not {' and '.join(strange)}"] if strange else []
         missing += self.loop.missing()
         monitor = [LYAPUNOV] if self.monitored else []
         missing += [] if self.linked(self._states, monitor) else [LYAPUNOV.name]
@@ -167,8 +167,8 @@ class Plant(PeerNode):
             self.words = "; ".join((f"waiting for {', '.join(missing)}", *misfits))
         else:
             deaf = [topic.name for topic in self.loop.topics if not self.linked(self._states, [topic])]
-            self.words = (f"waiting until whoever publishes {' and '.join(deaf) or 'a command'} listens to"
-                          f" {JOINT_STATES.name}, and all are connected")
+            self.words = (f"waiting for publishers of {' and '.join(deaf) or 'a command'} to subscribe to"
+                          f" {JOINT_STATES.name} and for connections")
         # Who has been here with another plant must have this scene before its first state.
         told = (*self._descriptions, self.heartbeats.publisher)
         known = all(publisher.get_subscription_count() >= len(self.readers(publisher))

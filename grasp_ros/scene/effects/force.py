@@ -36,7 +36,7 @@ TABLE = (
               several=True),
 )
 
-NEVER = "comes when the run has ended: nothing ever acts"
+NEVER = "is not before the run's end: no force acts"
 
 
 def _add(section: str, force: ExternalForce, system: System) -> None:
@@ -118,7 +118,7 @@ def _odd_table(section: str, sections: Sections, _: System) -> Iterable[str]:
     if not any(forces[: len(forces) - len(late)]):
         yield oddity(key, next(time for time, force in late if force != 0.0), NEVER, f"a begin {meant}")
     elif idle:
-        yield oddity(key, idle[0], "comes when the run has ended: its force never acts", f"a last time {meant}")
+        yield oddity(key, idle[0], "is not before the run's end: its force never acts", f"a last time {meant}")
 
 
 def _total(body: int, system: System, tick: int, _: Array) -> float:
@@ -127,7 +127,7 @@ def _total(body: int, system: System, tick: int, _: Array) -> float:
 
 def _effects(name: str, body: int) -> Iterable[Effect]:
     outputs = (Output(EXTERNAL_FORCES[name], partial(_total, body)),)
-    work = "the force does work: V_c rises by 2 f times the way at most"
+    work = "the force does work: V_c rises by at most twice its work"
     for kind, parameters, size, build, problems, odd, example in (
         ("pulse", PULSE, "force_N", _build_steps, partial(_off_tick, ("start_s", "length_s")),
          _odd_pulse, {"force_N": 2.0, "start_s": 0.5, "length_s": 0.1}),
