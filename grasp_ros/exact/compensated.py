@@ -42,7 +42,7 @@ def add(state: State, lane: int, change: float) -> None:
 
 @kernel
 def until(clock: Array, time: float) -> float:
-    """Seconds from now to a time of an interval, by its clock: the time since its begin, and beside it the low word."""
+    """Seconds from now to a time of an interval; its clock holds the time since its begin and the low word."""
     return (time - clock[0]) - clock[1]
 
 
@@ -55,7 +55,7 @@ def tick(clock: Array, step: float) -> None:
 
 @inlined
 def put(state: State, lane: int, value: float) -> None:
-    """Put a number of the state where something else tells that it is."""
+    """Set a number of the state, with the low word 0."""
     state.y[lane], state.low[lane] = value, 0.0
 
 
@@ -81,7 +81,7 @@ def move_in_flight(state: State, body: Body, flown: Flown) -> None:
 
 @inlined
 def move_arm_in_contact(state: State, side: Body, way_o: float, w: float, way_w: float) -> None:
-    """Move an arm on with the object, after that has moved by `way_o` m; w = sqrt(u) at the end, and its way."""
+    """Move an arm after the object has moved by `way_o` m; w = sqrt(u) at the end, `way_w` its change."""
     x, way, sign = velocity_lane(side) - 1, way_w * (2.0 * w - way_w), 1.0 if side == LEFT else -1.0
     if abs(way) <= SHORT_WAY * (w * w):
         add(state, x, way_o + sign * way)

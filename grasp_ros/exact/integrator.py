@@ -63,7 +63,7 @@ _AT_REST, _BODIES_THAT_ACT = REST_PLACE + SINCE, [0.0] * BODY_NUMBERS  # places 
 
 
 class Observer(Protocol):
-    """What looks on after each segment."""
+    """Segment callback of a run."""
 
     def attach(self, tables: Tables) -> Integers:
         """Addresses (2,) of a function and of its context, see `driver.callback`, for a run with this workspace."""
@@ -110,7 +110,7 @@ class Integrator:
         if begin.shape != (6,) or not all(map(math.isfinite, state)):
             raise Refused(f"state: {begin!r} is not an array of six finite numbers")
         self.status = Status.DONE
-        self.progress: Callable[[float], object] | None = None  # told the time in s every BREATH units of work
+        self.progress: Callable[[float], object] | None = None  # gets the time in s every BREATH units of work
         self.work = np.zeros(_WORK, dtype=np.int64)
         # Kernels are compiled once: for floats, and for arrays in C order that may be written to.
         self.system, self.continuous = system, continuous

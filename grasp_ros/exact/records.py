@@ -74,11 +74,11 @@ class Order(NamedTuple):
 
     number: int  # of its last term
     first: float  # tolerance^(1 / (number + 1)): where the first neglected term of a series with radius 1 reaches it
-    early: int  # of a term up to which they must have fallen no slower than up to the last one
+    early: int  # order up to which the terms must fall as fast as up to the last one
 
 
 class Settings(NamedTuple):
-    """What the accuracy of a run rests on."""
+    """Accuracy of a run, with its orders."""
 
     tolerance: float  # first neglected Taylor term, relative to the impact
     one: Order  # of a step with one pair in contact, unless the step is short
@@ -98,7 +98,7 @@ class Output(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """What drives a run through n intervals of constant inputs, and what it was; see `driver.intervals`."""
+    """Inputs of a run over n intervals, constant in each, and a record of them; see `driver.intervals`."""
 
     lengths: Array  # (n,) s
     begins: Array  # (n,) s, on the clock of the events
@@ -136,13 +136,13 @@ FACTORS = 32  # numbers of one order in the table of factors
 class Tables(NamedTuple):
     """Workspace of one call, flat: LANES Taylor coefficients and FACTORS factors of each order, and scratch.
 
-    The lanes of c are the places of the state y, with `layout.Z` for the depths, `layout.Lane` for the time since
-    the begin of the step and for w w or w_l w_r, as far as it is expanded.
+    The lanes of c have the indices of y, but for `layout.Z`, the depths, and `layout.Lane`, the time since the begin
+    of the step and w w or w_l w_r.
     """
 
     c: Array  # (LANES (order + 1),), with the order of `Settings.both`
     f: Array  # (FACTORS (order + 1),)
-    at: Array  # (2 LANES,) values of the lanes at some s, and how far they have come
+    at: Array  # (2 LANES,) values of the lanes at some s, and their changes since 0
     size: Array  # (LANES,) their sums of |c_k| s^k, k >= 2
     row: Array  # (order + 1,) one polynomial
     copy: Array  # (order + 1,) another one
@@ -200,7 +200,7 @@ class Flown(NamedTuple):
 
     x: float  # m
     v: float  # m/s
-    way: float  # m, with digits of its own; nan: the flight is long, it has none
+    way: float  # displacement, m, beyond the digits of x; nan: only x is known
     change: float  # of the velocity, m/s, likewise
 
 
@@ -217,7 +217,7 @@ class Segment(NamedTuple):
 
     kind: Kind
     t: float  # length, s; nan: it is not known
-    s: float  # the same in the variable of its events: of a Taylor step its own, of a flight t
+    s: float  # length in the variable of its events: s of a Taylor step, t of a flight
     step: Step  # whose series stand in the tables
     flights: Flights  # of all bodies, or of the arms that touch nothing
 
@@ -242,7 +242,7 @@ class PairFlight(NamedTuple):
     sign: float  # +1 for the left side, -1 for the right one: u = sign (x - x_o)
     u: float  # at the begin, m
     alike: bool  # equal rates: they move relative to each other as one such body
-    horizon: float  # time in s for which a bound may be taken: what a feedback drives may grow
+    horizon: float  # longest time in s of a bound: with c < 0 a motion grows; else inf
     inverse_p: float  # 1 / p, m/s
     x_e: float  # rest position of an arm with a spring, m
     square_rate: float  # of the faster body, 1/s^2
@@ -257,7 +257,7 @@ class Motion(NamedTuple):
     v_o: float
     u: float  # in a short flight exact where the difference of the positions is not
     d: float  # u'
-    size: float  # what the roundings of u are relative to, m
+    size: float  # scale of the rounding of u, m
 
 
 class Candidate(NamedTuple):
@@ -274,7 +274,7 @@ class Push(NamedTuple):
     rounding: float  # N, of it and of the friction
 
 
-class Leaning(NamedTuple):
+class Deciding(NamedTuple):
     """Where a pair at rest at u = 0 goes: the first derivative of u that differs from zero."""
 
     order: float  # of it; UNDECIDED or NEVER where there is none
@@ -282,16 +282,16 @@ class Leaning(NamedTuple):
 
 
 class Ends(NamedTuple):
-    """The first event of each pair and of the object in a segment, and how far it is known."""
+    """The first event of each pair and of the object in a segment, and where it ends."""
 
     left: Candidate
     right: Candidate
     slide: Candidate
-    known: float  # s, or the variable of a Taylor step
+    known: float  # end; s, or s of a Taylor step
 
 
 class Level(NamedTuple):
-    """An energy, and what its digits are relative to; and the penetrations that go with it."""
+    """An energy, the scale of its rounding, and the penetrations of the same state."""
 
     value: float  # J of V
     size: float  # J, sum of the sizes of its terms

@@ -1,4 +1,4 @@
-"""Tolerances: the bounds by which a rounding, or what an accuracy may neglect, decides; each with its reason.
+"""Tolerances: thresholds of rounding, and of terms that the accuracy neglects, each with its reason.
 
 Bounds of a few roundings of the terms at hand stand where they are used, and so do bounds that only save work, such as
 the number of iterations after which a search changes its method.
@@ -8,36 +8,38 @@ from __future__ import annotations
 
 from grasp_ros.physics.layout import EPS
 
-# Events and modes.
+# Events and modes. A rounding is EPS = 2^-52 of a number.
 TOGETHER = 1.0 + 4.0 * EPS  # events closer than this happen together: their times are sums of a few roundings
 DERIVATIVE = 64.0 * EPS  # of the sum of the sizes of its terms: a smaller derivative counts as 0, as their rounding
 SURFACE = 4.0  # roundings of the terms of 1 + p u', within which a pair is at u' = -1/p
-BEYOND = 2.0 * SURFACE  # roundings below -1/p, where a pair that was at -1/p has its CLAMP: its force may only die out
+BEYOND = 2.0 * SURFACE  # roundings below -1/p, where a pair that was at -1/p clamps: nearer, its force only dies out
 SURFACE_DRIFT = 1024.0  # as SURFACE, after flights, which leave roundings in u'
-FRICTION = 16.0 * EPS  # of the terms of what holds an object: of a force, and of a state that rests under it
+FRICTION = 16.0 * EPS  # of the terms of the force on an object at rest and of its friction: their rounding
+SLIDES = 0.5  # of the rounding of its force: an object that has just slipped and is accelerated by less stops at once
+SLIPS = 0.5 * SLIDES  # the same, below the friction: by more there is no slip yet; smaller, or it would stop at once
 LEFT_OUT = 0.25  # impulse of a pair that leaves without force, in units of the accuracy
 # Times the larger of the first two Taylor terms of the change of u' until u = 0. A pair whose |u'| is more does not
 # turn back; one whose u' is farther from -1/p is not clamped. The factors cover the other terms.
 TURNS, CLAMPS = 20.0, 4.0
 
 # The begin of a contact without its force.
-HELD = 2.0**-56  # of the impulse of a motion, which a pair may leave out: an eighth of a rounding
+FORCE_FREE = 2.0**-56  # of mu v: the impulse that a pair may neglect; EPS / 16, an eighth of a half ulp
 
 # Rest.
 REST = 2.0**-49  # of the scale of a scene: eight roundings, which forces that balance may have
 SETTLED = 40.0  # time constants after which a flight may rest: e^-40 is less than a rounding
 
-# Ways that have digits of their own.
+# Displacements computed as such.
 SHORT_FLIGHT, FAR_SHORT = 0.25, 1.0  # of the time constants: shorter flights take the power series; the second if FAR
-FAR = 4.0  # times the position, of a rest position: its roundings would take digits of a flight that hardly moves
+FAR = 4.0  # times |x|: the rounding of a rest position beyond it would take digits of a flight that hardly moves
 SHORT_START = 0.2  # of the time constants, well within those of a short flight
 SHORT_WAY = 0.125  # of a penetration: a longer way has roundings like those of its end
 
 # Taylor steps.
-DEFECT = 100.0  # times accuracy and rounding: what neglected terms may leave of an identity at the end of a step
+DEFECT = 100.0  # times accuracy plus EPS: allowed defect at the end of a step, see `taylor_step.is_exact`
 NOISE = 100.0 * EPS  # of a polynomial with some tens of terms
 STILL = 2.0**-4  # of a rounding of the fastest velocity: what a step may neglect of each
-CANCELS = 16.0  # times u' at both ends: if its terms are larger, u' at the end of a relaxation is their rounding
+CANCELS = 16.0  # times max(|u'|, 1/p): if its terms are larger, u' at the end of a relaxation is their rounding
 DECAYS = 2.0  # time constants of a damper that a step may span: terms that cancel are then e^2 times what is left
 
 # The check of a segment.

@@ -1,8 +1,8 @@
 """Quantities of a segment: a range that is cheap, and the extremes where they matter.
 
 In a flight a quantity a x + b v + c solves the equation of its body, so that the roots of its rate have a closed form.
-In a step quantities are polynomials, and `roots.first_rise` finds every root of their rates. No extreme lies between
-points of a grid, because there is none.
+In a step quantities are polynomials, and `roots.first_rise` finds every root of their rates. No grid is used, between
+whose points an extreme could lie.
 """
 
 from __future__ import annotations

@@ -74,7 +74,7 @@ def swing_squares(flight: Flight, t: float) -> float:
 
 @inlined
 def clamped_loss(segment: SegmentRecord, side: Body) -> float:
-    """What a pair that is closed without force takes: its stored energy goes."""
+    """Stored energy that a CLAMPED or LEAVING pair loses in a segment."""
     if segment.m.mode[side] not in (Pair.CLAMPED, Pair.LEAVING):
         return 0.0
     hertzian = segment.m.pairs[side, Law.HERTZIAN]

@@ -125,7 +125,7 @@ def begin(m: Memory, bound: float) -> None:
 
 @kernel
 def finish(m: Memory) -> None:
-    """What follows at the end of a run: whether the last times outside the bound are the last for good."""
+    """At the end of a run: keep the last times outside the bound, and find when all bodies settled."""
     seen = m.seen
     if m.switches[Switch.WANTED] & Wanted.BOUND.value:
         for body in (LEFT, OBJECT, RIGHT):
@@ -218,9 +218,9 @@ class RunObserver:
 
 
 def settle(integrator: Integrator, run_observer: RunObserver, stretch: float, horizons: int) -> None:
-    """Go on with a watched run that is over, in stretches of s, until V_c decides whether it has settled.
+    """Continue an observed run by `stretch` seconds at a time until V_c decides whether it has settled.
 
-    A run that does not get there, by its budget say, is not known to: nan.
+    SETTLED is nan if the run stops before, at its budget say.
     """
     run_observer.memory.switches[: Switch.CERTAIN] = Wanted.SETTLING, 0
     seen, done = run_observer.seen, 1

@@ -17,7 +17,7 @@ QUANTITIES = 12
 STATES = 8
 COUNTS = 4
 POSITION, VELOCITY = 0, 1  # columns of gains
-LOOKS = 6  # rows of scratch, one polynomial each
+SCRATCH_ROWS = 6  # rows of scratch, one polynomial each
 LOWER, UPPER = 4, 5  # those of them that hold bounds of the quantities
 LONGEST = higher_order(series_order(FINEST)) + 1
 
@@ -44,7 +44,7 @@ class Wanted(IntFlag):
 
 
 class Seen(IntEnum):
-    """Places of what is remembered; each extreme has a place of its own beside these."""
+    """Indices of what is remembered; the extremes fill LOW + q and HIGH + q."""
 
     LOW = 0  # of the quantities
     HIGH = QUANTITIES
@@ -67,7 +67,7 @@ UNDECIDED = -1.0  # in place of SETTLED: V_c is not low enough yet
 
 
 class Switch(IntEnum):
-    """Places of the whole numbers by which an observer is told what to do."""
+    """Indices of the integer settings of an observer."""
 
     WANTED = 0
     LOSSES = 1  # address of `observer.observe_losses`, 0: they are not wanted
@@ -92,14 +92,14 @@ class Memory(NamedTuple):
     gains: Array  # (2, 2) Kp and Kv of the feedback that acts all the time; 0 where commands are held
     seen: Array  # (SEEN,)
     before: Array  # (8,) y at the begin of the segment
-    rows: Array  # (LOOKS, LONGEST) scratch
+    rows: Array  # (SCRATCH_ROWS, LONGEST) scratch
     counts: Integers  # (COUNTS,) scratch
     switches: Integers  # (3,)
 
 
 def memory_of(plant: Plant, state: State) -> Memory:
     """A memory for the runs that use these arrays; a run brings its tables."""
-    scratch = np.zeros((LOOKS, LONGEST))
+    scratch = np.zeros((SCRATCH_ROWS, LONGEST))
     return Memory(
         scratch[0], scratch[0], state.y, state.mode, state.clock, state.rest, plant.bodies, plant.given, plant.pairs,
         np.zeros((3, 4)), np.zeros((3, 4)), np.zeros((3, 4)), np.zeros((2, 2)), np.zeros(SEEN), np.zeros(STATES),

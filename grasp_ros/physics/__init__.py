@@ -36,6 +36,6 @@ MuJoCo, `solref` and `solimp`           a linear spring and damper             n
 
 `model` has arm and contact as records and the impact force of any state, `impact_law` the force of a contact, `control`
 the law of a controller, `system` puts a scene into arrays, `layout` says what stands where in them, `energy` computes V
-and its balance, `sampled` the limits of a loop of held commands. `errors` holds the base of everything that is refused,
-here and in the rooms above.
+and its balance, `sampled` the limits of a loop of held commands. `errors` has the exception for refused input, here and
+in all packages.
 """

@@ -12,9 +12,8 @@ from grasp_ros.physics.layout import EPS
 def body_energy(mass: Any, stiffness: Any, force: Any, x: Any, v: Any, place: Any) -> Any:
     """m v^2 + k x^2 - 2 f x in J of V, which is twice the energy, and the sum of the sizes of its terms.
 
-    k (x - f/k)^2 would be the same but for a constant, (f/k)^2, that may be large beside it. `place` in m is what the
-    digits of x are relative to: the position of an arm in contact follows from that of the object, |x| + |x_o|; x = 0
-    has their rounding, too.
+    k (x - f/k)^2 differs by the constant f^2/k only, which may be far larger. `place` in m is the scale of the rounding
+    of x: |x| + |x_o| for an arm in contact, whose position follows from that of the object, also where x = 0.
     """
     kinetic = mass * v * v
     size = kinetic + (stiffness * (abs(x) + EPS * place) + 2.0 * abs(force)) * place

@@ -64,9 +64,9 @@ def feedback(row: Any, x: Any, v: Any) -> Any:
 
 
 def command_of(answer: object, who: str, tick: int, time: float) -> float:
-    """The command in N that a law of the user's own has answered with.
+    """The command in N that a user controller has answered with.
 
-    What is no finite number is refused; `who` is what the refusal begins with.
+    A value that is no finite number is refused; `who` begins the message.
     """
     try:
         force = float(answer) if isinstance(answer, Real) else math.nan
@@ -101,7 +101,7 @@ def normals_over(seed: tuple[int, int], first: int, count: int) -> Array:
 class ControlLaw:
     """Linear state feedback around a set-point, with the sensor and the actuator of its arm.
 
-    `row` holds all of its numbers, see `Column`; `seed`, of seed and side, is what its noise is drawn from, None: none.
+    `row` holds all of its numbers, see `Column`; `seed`, (seed, side), is that of its noise; None: no noise.
     """
 
     def __init__(self, position_gain: float, velocity_gain: float, set_point: float = 0.0, feed_forward: float = 0.0

@@ -102,7 +102,7 @@ class Systems:
 
     @cached_property
     def pressed(self) -> Array:
-        """Constant force through the pairs if all that is in contact were one rigid body there, (n, 2) in N."""
+        """Constant force of each pair if all bodies with contacts were one rigid body at x_o, (n, 2) in N."""
         push = self._bodies[..., Of.FORCE] - self._bodies[..., Of.STIFFNESS] * self.x[:, OBJECT:]
         mass = self.mass.copy()
         push[:, :OBJECT] *= self.touching
@@ -112,7 +112,7 @@ class Systems:
         return np.maximum(inward, 0.0) * self.touching
 
     def gaps(self) -> Array:
-        """Gap or penetration by a rounding of the largest position, (n, 2)."""
+        """Gap or penetration in roundings of the largest position, (n, 2)."""
         return np.abs(self.gap) / _rounding(self.x) * self.touching
 
     def closing(self) -> Array:
@@ -150,12 +150,12 @@ class Systems:
 
 
 def _rounding(numbers: Array) -> Array:
-    """Of the largest of three numbers (n, 3), and so large that PART of it is SMALLEST at least: (n, 1)."""
+    """Rounding of the largest of three numbers (n, 3), at least SMALLEST / PART: (n, 1)."""
     return np.asarray(np.maximum(EPS * np.abs(numbers).max(axis=1, keepdims=True), SMALLEST / PART))
 
 
 class Rule(NamedTuple):
-    """A bound of a ratio: from `low` to `high`; 0 stands for what is not there, and for no gap and no speed."""
+    """A ratio is 0 (absent body, no gap, no speed) or from `low` to `high`."""
 
     text: str
     low: float

@@ -167,7 +167,7 @@ def elastic_level(system: System, side: int, u: Array) -> Array:
 
 
 def _place(system: System, body: int, state: Array) -> Array:
-    """What the digits of a body's position are relative to: also the object, from which that of an arm follows."""
+    """Scale of the rounding of a body's position, m; with the object's for an arm, which may follow from it."""
     place: Array = np.abs(state[..., COLUMN[body]])
     return place + np.abs(state[..., COLUMN[OBJECT]]) if body != OBJECT and OBJECT in system.present else place
 

@@ -25,7 +25,7 @@ def _frozen_record(record: Any) -> Any:
 
 
 class _Freezers(dict[type, Callable[[Any], Any] | None]):
-    """What freezes values of a type, asked once for each: a short run feels every question; None: nothing changes."""
+    """Functions that freeze values of a type, found once for each type, for speed; None: the value is kept."""
 
     def __missing__(self, kind: type) -> Callable[[Any], Any] | None:
         freeze: Callable[[Any], Any] | None = None

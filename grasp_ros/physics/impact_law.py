@@ -2,12 +2,12 @@
 
     fw = H u^(3/2) (1 + p u')   if u >= 0 and u' >= -1/p, else 0     (6), (7), (10)
 
-u > 0 is penetration, u' > 0 approach, H in N/m^1.5, p in s/m. Each function works on floats and on NumPy arrays, and
-`exact.impact` compiles the same source for the kernels. `model.impact_force` puts the parts together for any u and u'.
-Another exponent also changes powers of w in `exact.contact.series` and `sensitivity.base_series`, a mean slope in
-`sensitivity.propagate`, the scales of an impact in `exact.contact.step_unit`, the impulse in `domain`, the bounds of
-`reach`, the quotients of `methods.discrete_gradient`, and the key of H with its unit and texts in
-`scene.effects.contact`. docs/oracles.md has what tests the law.
+u > 0 is penetration, u' > 0 approach, H in N/m^1.5, p in s/m. Each function takes floats or NumPy arrays, and
+`exact.impact` compiles the same source for the kernels. `model.impact_force` combines them for any u and u'.
+Another exponent changes powers of w in `exact.contact.series` and `sensitivity.base_series`, TAIL in
+`exact.contact.taylor_step`, a mean slope in `sensitivity.propagate`, scales in `exact.contact.step_unit`, the impulse
+in `domain`, the bounds of `reach`, quotients of `methods.discrete_gradient`, and the key of H, its unit and texts in
+`scene.effects.contact` and `scene.parameter`. Tests: docs/oracles.md.
 
 References
 ----------

@@ -111,7 +111,7 @@ class Slide(IntEnum):
 
 
 class Kind(IntEnum):
-    """How a segment of the motion is known."""
+    """How a segment of motion is solved."""
 
     FLIGHT = 0  # a closed form
     CONTACT = 1  # a Taylor step in regularised time: w = sqrt(u) of what touches

@@ -1,6 +1,6 @@
-"""What a controller of the user's own may ask for beside its arm, by the names of its parameters.
+"""What a user controller may observe besides its arm, by the names of its parameters.
 
-All of it belongs to the state that is answered, whether the controller runs without ROS or as a node.
+All values are those of the state that it answers, whether it runs without ROS or as a node.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def opposite(side: int) -> int:
 
 
 def asked(law: Callable[..., float]) -> tuple[str, ...]:
-    """What a law asks for beside its arm: names of `OBSERVABLES` among its parameters after the first four.
+    """Names of `OBSERVABLES` among the parameters of a law after the first four.
 
     TypeError if it cannot be called with these.
     """

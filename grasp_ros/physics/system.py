@@ -33,9 +33,9 @@ class ExternalForce(NamedTuple):
     changes: Callable[[int], Sequence[int]]  # ascending ticks of the run, in (0, n), at which it may change, from n
 
     def over(self, ticks: NDArray[np.int64]) -> Array:
-        """Values (n,) in N from each of the ascending ticks (n,) on, asked for only where it may change.
+        """Values (n,) in N from each of the ascending ticks (n,) on, computed only where it may change.
 
-        Or at the ticks themselves, between which there may be more changes than memory holds.
+        If there are more changes than ticks, it is computed at the ticks.
         """
         if not len(ticks):
             return np.zeros(0)

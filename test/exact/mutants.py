@@ -31,11 +31,12 @@ SEARCH = {"flight.search": "flight", "numerics.roots": "roots"}  # sampled alone
 EDGES = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq}
 OPERATIONS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult}
 EQUIVALENT: dict[str, str] = {
-    "impact_beside: drop u <= 0.0: state.mode[beside] != Pair.CONTACT or u <= 0.0": "at u = 0 all terms are 0",
+    "other_push: drop u <= 0.0: state.mode[beside] != Pair.CONTACT or u <= 0.0": "at u = 0 all terms are 0",
     **{f"make_transitions: drop {side}.when <= last: {side}.when <= last and {side}.what == Transition.CLAMP and"
        f" glides(plant, state, {side.upper()})": "it is asked again below; here it spares the price"
        for side in ("left", "right")},
-    "parts: delete branch: if not d < 0.0:": "at u' >= 0 the comparison below is false; here it spares two differences",
+    "separates: delete branch: if not d < 0.0:":
+        "at u' >= 0 the comparison below is false; here it spares two differences",
     "settle_resting: delete branch: if not (waits_l or waits_r):": "without a pair that waits nothing changes",
 }
 

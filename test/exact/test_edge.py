@@ -15,19 +15,19 @@ from grasp_ros.exact.automaton.edge import (
     HIGHEST,
     NEVER,
     UNDECIDED,
+    deciding_derivative,
     difference,
     glides,
     has_glided,
-    impact_beside,
-    leaning,
+    other_push,
     parting_time,
-    parts,
+    separates,
     surface_side,
 )
 from grasp_ros.exact.automaton.modes import leave_gliding, turn_back
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.kinematics import other
-from grasp_ros.exact.records import Leaning, Plant, State
+from grasp_ros.exact.records import Deciding, Plant, State
 from grasp_ros.exact.tolerances import DERIVATIVE, SURFACE
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Of, Pair, Slide, U, Work
 from grasp_ros.physics.model import Contact
@@ -82,11 +82,11 @@ def first_difference(plant: Plant, state: State, side: Body) -> tuple[int, Any]:
 def test_the_first_derivative_that_differs(side: Body, order: int, pressed: bool) -> None:
     arm, body, x, v = PARTING[order]
     plant, state = pair_at_rest(side, arm, body, x, v)
-    found = leaning(plant, state, side)
+    found = deciding_derivative(plant, state, side)
     assert (found.order, found.value) == first_difference(plant, state, side)
     if (found.value > 0.0) != pressed:  # the mirror image of the motion, not of the pair
         plant, state = pair_at_rest(side, (*arm[:3], -arm[3]), (*body[:3], -body[3]), -x, -v)
-        assert leaning(plant, state, side) == (found.order, -found.value)
+        assert deciding_derivative(plant, state, side) == (found.order, -found.value)
 
 
 def test_small_integers_part_at_the_orders_two_to_four_or_never() -> None:
@@ -99,7 +99,7 @@ def test_small_integers_part_at_the_orders_two_to_four_or_never() -> None:
         x, v = map(float, rng.integers(-1, 2, size=2))
         plant, state = pair_at_rest(LEFT, arm, body, x, v)  # type: ignore[arg-type]
         order, value = first_difference(plant, state, LEFT)
-        assert leaning(plant, state, LEFT) == ((order, value) if order else (NEVER, 0.0))
+        assert deciding_derivative(plant, state, LEFT) == ((order, value) if order else (NEVER, 0.0))
         found.append(order)
     assert set(found) == {0, 2, 3, 4}
 
@@ -116,7 +116,7 @@ def test_no_decision_within_rounding_and_none_against_the_truth(seed: int) -> No
     for off in (0.0, EPS, 40.0 * EPS, 1e-12, -1e-12, 1e-6):
         arm, body = (m, k, c, balance * (1.0 + off)), (m_o, 0.0, c_o, f_o)
         plant, state = pair_at_rest(LEFT, arm, body, float(x), float(v))
-        found = leaning(plant, state, LEFT)
+        found = deciding_derivative(plant, state, LEFT)
         order, value = first_difference(plant, state, LEFT)
         if found.order == NEVER:
             assert abs(off) <= 1e-12
@@ -130,8 +130,8 @@ def test_no_decision_within_rounding_and_none_against_the_truth(seed: int) -> No
 def test_a_difference_that_is_rounding_is_none() -> None:
     for off, decided in ((0.0, False), (16.0 * EPS, False), (300.0 * EPS, True)):
         plant, state = pair_at_rest(LEFT, (1.0, 0.0, 0.0, 1.0 + off), (1.0, 0.0, 0.0, 1.0), 0.0, 0.0)
-        found = leaning(plant, state, LEFT)
-        assert found == (Leaning(2.0, off) if decided else Leaning(NEVER, 0.0))
+        found = deciding_derivative(plant, state, LEFT)
+        assert found == (Deciding(2.0, off) if decided else Deciding(NEVER, 0.0))
     assert 16.0 * EPS < 2.0 * DERIVATIVE < 300.0 * EPS
 
 
@@ -141,7 +141,7 @@ def test_bodies_that_are_alike_never_part(side: Body) -> None:
         for scale in (1.0, 2.0, 0.7):
             alike = tuple(scale * value for value in row)
             plant, state = pair_at_rest(side, row, alike, 0.37, -1.3)  # type: ignore[arg-type]
-            assert leaning(plant, state, side).order == NEVER
+            assert deciding_derivative(plant, state, side).order == NEVER
 
 
 @SIDES
@@ -149,7 +149,7 @@ def test_bodies_that_are_alike_never_part(side: Body) -> None:
 def test_the_force_of_the_other_pair_and_its_rate(side: Body, u: float, d: float, p: float) -> None:
     """(6) and its derivative along the motion, in which the force itself takes part."""
     b = bench(side, 0.0, 0.0, beside=(u, d), beside_mode=Pair.CONTACT, p=p, push=0.4, beside_push=-3.0)
-    push, pace = impact_beside(b.plant, b.state, side)
+    push, pace = other_push(b.plant, b.state, side)
     with mp.workdps(40):
         hertzian, rate = mpf(1e4), mpf(d)
 
@@ -168,14 +168,14 @@ def test_the_force_of_the_other_pair_and_its_rate(side: Body, u: float, d: float
 def test_without_force_nothing_pushes_beside(side: Body) -> None:
     for mode, far in ((Pair.OPEN, (0.01, 0.1)), (Pair.CLAMPED, (0.01, 0.1)), (Pair.CONTACT, (0.0, 0.1))):
         b = bench(side, 0.0, 0.0, beside=far, beside_mode=mode)
-        assert impact_beside(b.plant, b.state, side) == (0.0, 0.0)
+        assert other_push(b.plant, b.state, side) == (0.0, 0.0)
 
 
 @SIDES
 def test_the_force_of_the_other_pair_decides_with_its_value_and_its_rate(side: Body) -> None:
-    def found(**options: Any) -> Leaning:
+    def found(**options: Any) -> Deciding:
         b = bench(side, 0.0, 0.0, beside=(0.01, options.pop("d")), beside_mode=Pair.CONTACT, p=0.0, **options)
-        return Leaning(*leaning(b.plant, b.state, side))
+        return Deciding(*deciding_derivative(b.plant, b.state, side))
 
     assert found(d=0.0) == pytest.approx((2.0, 10.0))
     assert found(d=0.0, push=-12.0) == pytest.approx((2.0, -2.0))
@@ -189,7 +189,7 @@ def test_drag_of_the_object_lessens_what_the_force_of_the_other_pair_does(side: 
     """The force accelerates 2 kg by 5 m/s^2, which the arm balances; its rate gives 150 m/s^3, and 0.8 N s/m take 2."""
     b = bench(side, 0.0, 0.0, beside=(0.01, 0.2), beside_mode=Pair.CONTACT, p=0.0, push=-5.0)
     b.plant.bodies[OBJECT, Of.MASS], b.plant.bodies[OBJECT, Of.DAMPING] = 2.0, 0.8
-    assert leaning(b.plant, b.state, side) == pytest.approx((3.0, 148.0))
+    assert deciding_derivative(b.plant, b.state, side) == pytest.approx((3.0, 148.0))
 
 
 @SIDES
@@ -197,16 +197,16 @@ def test_drag_of_the_object_lessens_what_the_force_of_the_other_pair_does(side: 
 def test_a_force_that_only_begins_at_the_surface_decides_with_its_rate(side: Body, push: float) -> None:
     """At u' = -1/p the force is zero; what pushes the other arm off that surface lets it grow, either way."""
     b = bench(side, 0.0, 0.0, beside=(0.01, -2.0), beside_mode=Pair.CONTACT, p=0.5, beside_push=push)
-    value, pace = impact_beside(b.plant, b.state, side)
+    value, pace = other_push(b.plant, b.state, side)
     assert (value, pace) == (0.0, pytest.approx(-5.0 * push))
-    assert leaning(b.plant, b.state, side) == pytest.approx((3.0, pace))
+    assert deciding_derivative(b.plant, b.state, side) == pytest.approx((3.0, pace))
 
 
 @SIDES
 def test_a_wall_hands_no_force_on(side: Body) -> None:
     b = bench(side, 0.0, 0.0, beside=(0.01, 0.3), beside_mode=Pair.CONTACT, slide=Slide.STUCK)
     b.plant.bodies[OBJECT, Of.MASS], b.plant.bodies[OBJECT, Of.FORCE] = math.inf, 0.0
-    assert leaning(b.plant, b.state, side).order == NEVER
+    assert deciding_derivative(b.plant, b.state, side).order == NEVER
 
 
 @SIDES
@@ -232,7 +232,7 @@ def test_beside_a_pair_that_begins_at_zero(
     b = bench(side, 0.0, 0.0, beside=(0.0, beside.get("d", 0.0)), beside_mode=Pair.CONTACT,
               push=own.get("push", 0.0) + common, object_push=common, beside_push=common - beside.get("push", 0.0),
               stiffness=own.get("stiffness", 0.0), object_speed=own.get("speed", 0.0))
-    assert leaning(b.plant, b.state, side) == expected
+    assert deciding_derivative(b.plant, b.state, side) == expected
 
 
 # How long the sign is certain.
@@ -261,7 +261,7 @@ def parting(plant: Plant, state: State, side: Body) -> float:
 def test_a_certain_time_is_not_too_long_nor_nothing(side: Body, order: int) -> None:
     arm, body, x, v = PARTING[order]
     plant, state = pair_at_rest(side, arm, body, x, v)
-    _, value = leaning(plant, state, side)
+    _, value = deciding_derivative(plant, state, side)
     span = parting(plant, state, side)
     assert sign_holds(plant, state, side, span, value)
     assert span > 1e-2
@@ -271,7 +271,7 @@ def test_a_certain_time_is_not_too_long_nor_nothing(side: Body, order: int) -> N
 def test_a_later_derivative_may_turn_a_pair_back(side: Body) -> None:
     """1e-6 t^2 / 2 - t^3 / 6 turns back at 3e-6 s."""
     plant, state = pair_at_rest(side, (1.0, 1.0, 0.0, 1e-6), (1.0, 0.0, 0.0, 0.0), 0.0, 1.0)
-    order, value = leaning(plant, state, side)
+    order, value = deciding_derivative(plant, state, side)
     span = parting(plant, state, side)
     assert (order, value) == (2.0, 1e-6)
     assert sign_holds(plant, state, side, span, value)
@@ -284,7 +284,7 @@ def test_a_derivative_that_is_rounding_hides_no_later_one(side: Body, v: float) 
     k, c = 0.7, 0.3
     a = -k * v / c  # c a + k v = 0
     plant, state = pair_at_rest(side, (1.0, k, c, a + c * v), (1.0, 0.0, 0.0, a + 1e-6), 0.0, v)
-    order, value = leaning(plant, state, side)
+    order, value = deciding_derivative(plant, state, side)
     span = parting(plant, state, side)
     assert (order, value) == (2.0, pytest.approx(-1e-6))
     assert 0.0 < difference(plant, state.y, side, 3)[0] < 1e-15  # rounding, and of the other sign
@@ -305,7 +305,7 @@ def test_certain_times_of_random_pairs(seed: int) -> None:
     off = float(rng.choice([0.0, 1e-9, -1e-9, 1e-3, -1e-3, 1.0]))
     arm, body = (m, k, c, balance + off * abs(balance)), (m_o, k_o, c_o, float(f_o))
     plant, state = pair_at_rest(LEFT, arm, body, float(x), float(v))
-    order, value = leaning(plant, state, LEFT)
+    order, value = deciding_derivative(plant, state, LEFT)
     if order == NEVER:
         return
     span = parting(plant, state, LEFT)
@@ -360,7 +360,7 @@ def test_a_pair_parts_where_nothing_but_its_force_can_turn_it_back(
     side: Body, u: float, d: float, options: dict[str, float], expected: bool
 ) -> None:
     b = bench(side, u, d, Pair.CONTACT, **options)  # type: ignore[arg-type]
-    assert parts(b.plant, b.state.y, side) is expected
+    assert separates(b.plant, b.state.y, side) is expected
 
 
 # At u' = -1/p.
@@ -412,12 +412,12 @@ def test_beyond_the_third_derivative_only_bodies_without_an_impact_beside_are_kn
     beside = {"beside": (u, 0.0), "beside_mode": Pair.CONTACT, "beside_push": a - 20.0}
     pressed = {**alone, **beside, "push": a + k * u - 10.0}
     b = bench(side, u, -2.0, Pair.CONTACT, **pressed)
-    push, pace = impact_beside(b.plant, b.state, side)
+    push, pace = other_push(b.plant, b.state, side)
     assert (abs(push), pace) == (pytest.approx(10.0), pytest.approx(0.0, abs=1e-9))
     assert surface_side(b.plant, b.state, side) == 0.0
     glides_beside = {**alone, "beside": (u, -2.0), "beside_mode": Pair.CONTACT, "beside_push": 5.0}
     b = bench(side, u, -2.0, Pair.CONTACT, **glides_beside)
-    push, pace = impact_beside(b.plant, b.state, side)
+    push, pace = other_push(b.plant, b.state, side)
     assert push == 0.0
     b = bench(side, u, -2.0, Pair.CONTACT, **{**glides_beside, "object_speed": 2.0 + pace / k})
     assert surface_side(b.plant, b.state, side) == 0.0

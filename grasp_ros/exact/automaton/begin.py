@@ -1,7 +1,8 @@
-"""The begin of a contact that the regularised time cannot begin: it stops where w_l w_r = 0, and where u = u' = 0.
+"""Start of a contact where regularised time stops: w_l w_r = 0, or u = u' = 0.
 
-Such a pair is BEGINNING: it moves without its force for as long as the impulse left out is below HELD mu v, where mu is
-its reduced mass and v the largest of |u'| and the speeds of its two bodies. Roundings of these velocities are larger.
+Such a pair is BEGINNING: it moves without its force while the impulse neglected is below FORCE_FREE mu v; mu: reduced
+mass, v: the largest of |u'| and the speeds of its bodies, whose roundings are larger. `force_free_time`
+finds how long; while the other pair pushes, `contact.segment.force_free_length` does. `modes.end_begin` ends it.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from grasp_ros.exact.kinematics import approach, other, rate_lanes, reduced_mass
 from grasp_ros.exact.numerics.powers_of_two import exponent, power_of_two
 from grasp_ros.exact.numerics.roots import value_and_rate
 from grasp_ros.exact.records import Array, Plant, State
-from grasp_ros.exact.tolerances import HELD
+from grasp_ros.exact.tolerances import FORCE_FREE
 from grasp_ros.physics.layout import Body, Law, Pair, U
 
 MOST_HALVINGS = 200  # of a short flight
@@ -23,7 +24,7 @@ MOST_HALVINGS = 200  # of a short flight
 
 @inlined
 def must_begin(state: State, side: Body) -> bool:
-    """Whether a pair is in contact where its Taylor steps cannot begin."""
+    """Whether a pair in contact is where no Taylor step can start."""
     y, beside = state.y, other(side)
     if state.mode[side] != Pair.CONTACT or y[U.L + side] != 0.0:
         return False
@@ -35,8 +36,8 @@ def must_begin(state: State, side: Body) -> bool:
 def force_free_time(f: Array, plant: Plant, state: State, side: Body) -> float:
     """Time in s, a power of two, for which a pair at u = 0 that begins may fly without its force.
 
-    The search multiplies a tiny time until the force left out is too large or u' changes its sign: up to there the
-    force is largest at the end. inf where nothing moves the pair. The series of u is written to f.
+    The search multiplies a tiny time until the force neglected is too large or u' changes its sign: until then the
+    force is largest at the end. inf if not BEGINNING or not moved. The series of u is left in f.
     """
     y = state.y
     if state.mode[side] != Pair.BEGINNING or write_own_series(plant, y, side, f) == 0.0:
@@ -68,5 +69,6 @@ def leaves_force_out(plant: Plant, side: Body, u: float, d: float, speed: float)
         return u <= 0.0
     pair, motion = plant.pairs[side], reduced_mass(plant.bodies, side) * max(d, speed)
     force = elastic_force(pair[Law.HERTZIAN], u) * damping_factor(pair[Law.DISSIPATION], d)
-    hidden = plant.coulomb == 0.0 or force <= HELD * plant.coulomb  # a stuck object slips by the force, not the impulse
-    return bool(hidden and force * (u / d) <= HELD * motion)
+    # A stuck object slips by the force, not by the impulse.
+    hidden = plant.coulomb == 0.0 or force <= FORCE_FREE * plant.coulomb
+    return bool(hidden and force * (u / d) <= FORCE_FREE * motion)

@@ -21,18 +21,18 @@ from grasp_ros.exact.kinematics import (
     surface_factor,
 )
 from grasp_ros.exact.numerics.roots import first_rise
-from grasp_ros.exact.records import Array, Integers, Leaning, Plant, State
+from grasp_ros.exact.records import Array, Deciding, Integers, Plant, State
 from grasp_ros.exact.tolerances import CLAMPS, DERIVATIVE, SHORT_START, SURFACE, TURNS
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import OBJECT, Body, Law, Of, Pair, U, V, X
 
-LOWEST, NEXT, HIGHEST = (whole(order) for order in (2, 3, 6))  # derivatives; typed, or each is compiled anew
+LOWEST, NEXT, HIGHEST = (whole(order) for order in (2, 3, 6))  # int64: numba compiles anew for each literal
 LONGEST = RANGES["duration"].high  # s
-UNDECIDED, NEVER = 0.0, math.inf  # orders of a `Leaning` that is none
+UNDECIDED, NEVER = 0.0, math.inf  # orders if no derivative decides
 
 
 @kernel
-def impact_beside(plant: Plant, state: State, side: Body) -> tuple[float, float]:
+def other_push(plant: Plant, state: State, side: Body) -> tuple[float, float]:
     """Acceleration in m/s^2, and its rate, that the force of the other pair gives the object towards `side`."""
     beside = other(side)
     u = state.y[U.L + beside]
@@ -48,26 +48,26 @@ def impact_beside(plant: Plant, state: State, side: Body) -> tuple[float, float]
 
 
 @kernel
-def leaning(plant: Plant, state: State, side: Body) -> Leaning:
+def deciding_derivative(plant: Plant, state: State, side: Body) -> Deciding:
     """The first derivative of u of a pair at rest that differs from zero by more than its rounding.
 
     If the other contact pushes, its force and the rate of its force are part of the derivatives 2 and 3, and no higher
-    one is known. If the other pair is at its begin and no derivative differs from zero, the force that it is going to
-    have closes this one.
+    one is known. If the other pair is going to push, and no derivative of this one differs from zero, that force will
+    close it.
     """
     y, beside = state.y, other(side)
     closed = state.mode[beside] in (Pair.CONTACT, Pair.BEGINNING) and plant.bodies[OBJECT, Of.MASS] < math.inf
     if closed and state.mode[beside] == Pair.CONTACT and y[U.L + beside] > 0.0:
-        push, pace = impact_beside(plant, state, side)
+        push, pace = other_push(plant, state, side)
         found = first_difference(plant, y, side, push, pace, NEXT)
-        return found if found.order < NEVER else Leaning(UNDECIDED, 0.0)
+        return found if found.order < NEVER else Deciding(UNDECIDED, 0.0)
     found = own_difference(plant, y, side)
     begins = closed and (approach(y, beside) != 0.0 or own_difference(plant, y, beside).order < NEVER)
-    return Leaning(UNDECIDED, math.inf) if found.order == NEVER and begins else found
+    return Deciding(UNDECIDED, math.inf) if found.order == NEVER and begins else found
 
 
 @kernel
-def first_difference(plant: Plant, y: Array, side: Body, push: float, pace: float, highest: int) -> Leaning:
+def first_difference(plant: Plant, y: Array, side: Body, push: float, pace: float, highest: int) -> Deciding:
     """The first derivative of u beyond its rounding, or NEVER; `push` is a further acceleration, `pace` its rate."""
     drag = plant.bodies[OBJECT, Of.DAMPING] / plant.bodies[OBJECT, Of.MASS]
     for order in range(LOWEST, highest + 1):
@@ -75,13 +75,13 @@ def first_difference(plant: Plant, y: Array, side: Body, push: float, pace: floa
         added = push if order == 2 else (pace - drag * push if order == 3 else 0.0)
         value += added
         if abs(value) > DERIVATIVE * (size + abs(added)):
-            return Leaning(float(order), value)
-    return Leaning(NEVER, 0.0)
+            return Deciding(float(order), value)
+    return Deciding(NEVER, 0.0)
 
 
 @kernel
-def own_difference(plant: Plant, y: Array, side: Body) -> Leaning:
-    """`first_difference` of arm and object by themselves."""
+def own_difference(plant: Plant, y: Array, side: Body) -> Deciding:
+    """`first_difference` without the other pair's push."""
     return first_difference(plant, y, side, 0.0, 0.0, HIGHEST)
 
 
@@ -96,9 +96,9 @@ def difference(plant: Plant, y: Array, side: Body, order: int) -> tuple[float, f
 
 @kernel
 def write_own_series(plant: Plant, y: Array, side: Body, f: Array) -> float:
-    """Write the series of u of arm and object by themselves, up to the order HIGHEST; its first number that is not 0.
+    """Write the series of u without impact forces up to the order HIGHEST; returns its first coefficient that is not 0.
 
-    0 where nothing moves the pair.
+    0 if there is none.
     """
     f[0], f[1], factorial = y[U.L + side], approach(y, side), 1.0
     for order in range(LOWEST, HIGHEST + 1):
@@ -127,8 +127,8 @@ def is_negligible(plant: Plant, side: Body, u: float, d: float, part: float) -> 
 
 
 @kernel
-def parts(plant: Plant, y: Array, side: Body) -> bool:
-    """Whether a pair separates, and nothing but its force can turn it back, or take u' to -1/p, before u = 0."""
+def separates(plant: Plant, y: Array, side: Body) -> bool:
+    """Whether a pair separates, and without its force neither turns back nor gets to u' = -1/p before u = 0."""
     d, loss = approach(y, side), plant.pairs[side, Law.DISSIPATION]
     if not d < 0.0:
         return False
@@ -141,7 +141,7 @@ def parts(plant: Plant, y: Array, side: Body) -> bool:
 
 @kernel
 def short_time(plant: Plant, side: Body) -> float:
-    """How long, in s, a flight of arm and object from u = 0 is a short one; inf where nothing but forces moves them."""
+    """Time in s within which a flight from u = 0 takes its power series; inf without springs and dampers."""
     rate = 0.0
     for body in (side, OBJECT):
         row = plant.bodies[body]
@@ -151,9 +151,9 @@ def short_time(plant: Plant, side: Body) -> float:
 
 @kernel
 def parting_time(f: Array, plant: Plant, state: State, side: Body, work: Integers) -> float:
-    """How long, in s, a pair at rest keeps the sign of u in a short flight; inf where nothing moves it.
+    """Time in s for which a pair at rest keeps the sign of u in a short flight; inf if nothing moves it.
 
-    Half of what its series up to the order HIGHEST, which is written to f, gives: that leaves room for what follows.
+    Half of that by the series up to the order HIGHEST, which is left in f, to allow for higher terms.
     """
     first = write_own_series(plant, state.y, side, f)
     if first == 0.0:
@@ -171,29 +171,29 @@ def surface_side(plant: Plant, state: State, side: Body) -> float:
     factor = surface_factor(plant.pairs, state.y, side, SURFACE)
     if factor != 0.0:
         return float(factor)
-    push, pace = impact_beside(plant, state, side)
+    push, pace = other_push(plant, state, side)
     highest = HIGHEST if push == 0.0 and pace == 0.0 else NEXT  # of an impact no more is known
     return float(first_difference(plant, state.y, side, push, pace, highest).value)
 
 
 @kernel
-def stays(plant: Plant, state: State, side: Body) -> bool:
+def keeps_rate(plant: Plant, state: State, side: Body) -> bool:
     """Whether u' of a pair stays as it is without impacts."""
     return bool(own_difference(plant, state.y, side).order == NEVER)
 
 
 @kernel
 def glides(plant: Plant, state: State, side: Body) -> bool:
-    """Whether nothing moves a pair off u' = -1/p: neither its own motion nor the other pair, which will not push.
+    """Whether nothing moves a pair off u' = -1/p: neither its own motion nor a push of the other pair.
 
-    That one is without force, or glides as well: in a symmetric grasp both are treated alike at one instant.
+    The other one has no force, or glides as well: in a symmetric grasp both are treated alike at one instant.
     """
     beside = other(side)
-    if not stays(plant, state, side):
+    if not keeps_rate(plant, state, side):
         return False
     if state.mode[beside] == Pair.CONTACT and surface_factor(plant.pairs, state.y, beside, SURFACE) != 0.0:
         return False
-    return state.mode[beside] not in (Pair.CONTACT, Pair.CLAMPED) or stays(plant, state, beside)
+    return state.mode[beside] not in (Pair.CONTACT, Pair.CLAMPED) or keeps_rate(plant, state, beside)
 
 
 @kernel

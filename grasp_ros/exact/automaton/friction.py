@@ -2,7 +2,7 @@
 
 A sliding object has the friction in its constant force. A stuck one gets an infinite mass: whatever pushes it moves it
 as little as a wall, in the same equations. Both are the row OBJECT of `Plant.bodies`; `Plant.given` keeps what the
-scene says. Which of them it is, `modes` decides.
+scene says. `modes.initial_slide` decides.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from grasp_ros.exact.kinematics import approach, rate_lanes
 from grasp_ros.exact.numerics.polynomial import values
 from grasp_ros.exact.numerics.roots import first_rise, value_and_rate
 from grasp_ros.exact.records import Array, Candidate, Integers, Plant, Push, State, Tables
-from grasp_ros.exact.tolerances import FRICTION
+from grasp_ros.exact.tolerances import FRICTION, SLIDES
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Of, Pair, Slide, U, V, Z
 
 
 @kernel
 def lift_friction(plant: Plant) -> None:
-    """Let the bodies act as the scene and the inputs say."""
+    """Reset `bodies` to `given`: no friction acts."""
     for body in range(3):
         for column in range(4):
             plant.bodies[body, column] = plant.given[body, column]
@@ -184,7 +184,7 @@ def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: floa
             row[k] = factor * c[LANES * k + V.O]
         if row[0] == 0.0:
             accelerating = c[LANES + Lane.TIME] * push_on_object(plant, state).rounding / plant.bodies[OBJECT, Of.MASS]
-            if abs(row[1]) <= 0.5 * accelerating:
+            if abs(row[1]) <= SLIDES * accelerating:
                 row[1] = 0.0
         return Candidate(first_rise(row, n, h, 0.0, work), Slide.STUCK)
     impact_series(tables, plant, state.mode, n)

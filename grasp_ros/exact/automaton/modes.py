@@ -7,14 +7,22 @@ consistent where one begins, and `make_transitions` where it ends; `begin_interv
 from __future__ import annotations
 
 from grasp_ros.exact.automaton.begin import must_begin
-from grasp_ros.exact.automaton.edge import NEVER, glides, has_glided, is_negligible, leaning, parts, surface_side
+from grasp_ros.exact.automaton.edge import (
+    NEVER,
+    deciding_derivative,
+    glides,
+    has_glided,
+    is_negligible,
+    separates,
+    surface_side,
+)
 from grasp_ros.exact.automaton.friction import apply_friction, lift_friction, push_on_object
 from grasp_ros.exact.compensated import copy, meet, put, velocity_lane
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.driver.outputs import record
 from grasp_ros.exact.kinematics import approach, is_closed, is_resting, other
 from grasp_ros.exact.records import Ends, Output, Plant, Settings, State
-from grasp_ros.exact.tolerances import LEFT_OUT, SURFACE, SURFACE_DRIFT, TOGETHER
+from grasp_ros.exact.tolerances import LEFT_OUT, SLIPS, SURFACE, SURFACE_DRIFT, TOGETHER
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Law, Pair, Slide, Transition, U, V
 
 
@@ -29,7 +37,7 @@ def mode_of(plant: Plant, state: State, side: Body) -> Pair:
         return Pair.CONTACT if surface_side(plant, state, side) >= 0.0 else Pair.CLAMPED
     if u < 0.0 or d != 0.0:
         return Pair.CONTACT if u == 0.0 and d > 0.0 else Pair.OPEN
-    order, value = leaning(plant, state, side)
+    order, value = deciding_derivative(plant, state, side)
     if order == NEVER:
         return Pair.RESTING
     return Pair.CONTACT if value > 0.0 else Pair.OPEN
@@ -37,8 +45,8 @@ def mode_of(plant: Plant, state: State, side: Body) -> Pair:
 
 @kernel
 def initial_modes(plant: Plant, state: State) -> None:
-    """Modes of both pairs for a run that starts here, until each follows from the other: both at once, for symmetry."""
-    for _ in range(3):  # by its motion, beside the other one, and beside that one where it follows from this
+    """Modes of both pairs at the start of a run, iterated as each depends on the other; both at once, for symmetry."""
+    for _ in range(3):  # by its own motion; by the other's mode; by that mode where it depended on this one
         left, right = mode_of(plant, state, LEFT), mode_of(plant, state, RIGHT)
         state.mode[LEFT], state.mode[RIGHT] = left, right
 
@@ -61,7 +69,7 @@ def initial_slide(plant: Plant, state: State) -> None:
 
 @kernel
 def begin_interval(plant: Plant, state: State, out: Output) -> None:
-    """Modes under the inputs of a new interval, or the first of a run; one that handed over its events keeps them."""
+    """Set the modes under the inputs of a new interval, or the first of a run; a resumed interval keeps them."""
     mode = state.mode
     lift_friction(plant)
     if mode[LEFT] == Pair.UNKNOWN:
@@ -90,7 +98,7 @@ def record_first_touch(state: State, side: Body, out: Output) -> None:
 
 @inlined
 def mode_at_tick(plant: Plant, state: State, side: Body) -> Pair:
-    """Mode of a pair under new inputs: anew, if it leaves and something moves it; at rest, `settle_resting` decides."""
+    """Mode of a pair under new inputs: a new one if it is LEAVING and moved; `settle_resting` sets pairs at rest."""
     mode = state.mode[side]
     leaves = mode == Pair.LEAVING and not has_glided(plant, state, side, SURFACE_DRIFT)
     return mode_of(plant, state, side) if leaves else mode
@@ -107,7 +115,7 @@ def settle_object(plant: Plant, state: State, out: Output) -> None:
 
 @kernel
 def settle(state: State, side: Body, following: Pair, out: Output) -> None:
-    """Give a pair its mode anew, and record it if that opens or closes it, or if one that was leaving is clamped."""
+    """Set the mode of a pair, and record a TOUCH, a RELEASE, or a CLAMP of a pair that was LEAVING."""
     mode, y = state.mode, state.y
     before, left = is_closed(mode[side]), mode[side] == Pair.LEAVING
     mode[side] = following
@@ -119,13 +127,13 @@ def settle(state: State, side: Body, following: Pair, out: Output) -> None:
 
 @inlined
 def waits(state: State, side: Body) -> bool:
-    """Whether a pair is at u = u' = 0, without force, or in contact: the other pair may have changed."""
+    """Whether a pair is at u = u' = 0 and its mode may change, as the other pair may have changed."""
     return state.mode[side] in (Pair.OPEN, Pair.RESTING, Pair.CONTACT, Pair.BEGINNING) and is_resting(state.y, side)
 
 
 @inlined
 def settle_resting(plant: Plant, state: State, out: Output) -> None:
-    """Pairs at u = u' = 0: what acts now may press them together, one of them the other, too."""
+    """Settle pairs at u = u' = 0: inputs, or the other pair, may press them together now."""
     waits_l, waits_r = waits(state, LEFT), waits(state, RIGHT)
     if not (waits_l or waits_r):
         return
@@ -156,7 +164,7 @@ def end_begin(state: State, side: Body, out: Output) -> None:
 
 @inlined
 def leave_gliding(plant: Plant, state: State) -> None:
-    """Take pairs in contact whose force has died out at u' = -1/p, off which nothing moves them."""
+    """Make pairs LEAVING whose force has died out at u' = -1/p, and which nothing moves off it."""
     mode = state.mode
     left = mode[LEFT] == Pair.CONTACT and has_glided(plant, state, LEFT, SURFACE)
     right = mode[RIGHT] == Pair.CONTACT and has_glided(plant, state, RIGHT, SURFACE)
@@ -178,15 +186,15 @@ def settle_pairs(plant: Plant, state: State, settings: Settings, out: Output) ->
 
 @inlined
 def let_leave(plant: Plant, state: State, settings: Settings) -> None:
-    """Take pairs off that glide, and both off a release at one instant, where w_l w_r stops the regularised time."""
+    """Make pairs LEAVING that glide, and both before a common release: w_l w_r = 0 stops regularised time."""
     mode, y = state.mode, state.y
     leave_gliding(plant, state)
-    slipping = mode[OBJECT] in (Slide.RIGHTWARD, Slide.LEFTWARD) and y[V.O] == 0.0  # by their force alone
+    slipping = mode[OBJECT] in (Slide.RIGHTWARD, Slide.LEFTWARD) and y[V.O] == 0.0  # it needs their force
     if mode[LEFT] != Pair.CONTACT or mode[RIGHT] != Pair.CONTACT or slipping:
         return
     for side in (LEFT, RIGHT):
         u, d = y[U.L + side], approach(y, side)
-        if not (parts(plant, y, side) and is_negligible(plant, side, u, d, LEFT_OUT * settings.tolerance)):
+        if not (separates(plant, y, side) and is_negligible(plant, side, u, d, LEFT_OUT * settings.tolerance)):
             return
     mode[LEFT] = mode[RIGHT] = Pair.LEAVING
 
@@ -214,8 +222,8 @@ def make_transitions(plant: Plant, state: State, ends: Ends, end: float, out: Ou
 def make_transition(plant: Plant, state: State, side: Body, kind: Transition, leaves: bool, out: Output) -> None:
     """The reset map of a pair: its next mode, u = 0 at a touch and a release, and the record of the event.
 
-    A touch whose u' has been lost to rounding finds a pair at rest: it is `settle_resting` that decides. What looks
-    like a CLAMP of a pair that glides at u' = -1/p, which it never passes, is rounding: it `leaves` without an event.
+    A touch with u' <= 0 by rounding is that of a pair at rest: `settle_resting` decides. A CLAMP of a pair that glides
+    at u' = -1/p, which it never passes, is rounding: the pair `leaves` without an event.
     """
     y, mode, d = state.y, state.mode, approach(state.y, side)
     if kind in (Transition.TOUCH, Transition.RELEASE):
@@ -247,16 +255,16 @@ def turn_back(state: State, side: Body) -> None:
 def make_slide_transition(plant: Plant, state: State, following: Slide, out: Output) -> None:
     """The reset map of the object: it slips into the mode that follows, stops, or turns without a rest; v_o = 0.
 
-    The series by which it slips have the error of the accuracy. Where the force in the state at their end is still
-    below the friction, by half of that for which `slide_in_contact` would stop it at once, because the two differ by a
-    rounding, it sticks on: the next step finds a slip.
+    The slip is found in series with the error of the accuracy. If the force in the state at their end is below the
+    friction by a quarter of its rounding, the object stays stuck, and the next step finds the slip; at half of it,
+    `slide_in_contact` would stop the object at once.
     """
     put(state, V.O, 0.0)
     if state.mode[OBJECT] != Slide.STUCK:
         settle_object(plant, state, out)
         return
     push = push_on_object(plant, state)
-    if abs(push.value) - plant.coulomb < -0.25 * push.rounding:
+    if abs(push.value) - plant.coulomb < -SLIPS * push.rounding:
         return
     state.mode[OBJECT] = following
     apply_friction(plant, state.mode)

@@ -27,7 +27,7 @@ DEEP_STACK = 70_000  # slots; more than half a megabyte
 
 
 def whole(number: int) -> int:
-    """A whole number that numba does not take for a literal, for each of which it would compile a kernel anew."""
+    """An int64 in place of a literal: numba would compile a kernel anew for each literal integer."""
     return np.int64(number)  # type: ignore[return-value]
 
 
@@ -62,7 +62,7 @@ def allocating(function: K) -> K:
 
 
 def instruction(typing: Callable[..., Any]) -> Callable[[K], K]:
-    """A function that kernels call as a few instructions; as it stands it is what runs where nothing is compiled.
+    """A function that kernels call as a few instructions; without compilation its Python body runs.
 
     `typing` is for `numba.extending.intrinsic`: from the types of the arguments to a signature, and to what emits code.
     """

@@ -64,7 +64,7 @@ class Kernel(CPUDispatcher):
 
 @contextmanager
 def _parts(dispatcher: CPUDispatcher) -> Iterator[None]:
-    """What this thread compiles meanwhile are parts, and what it has typed once is known; it must have numba's lock."""
+    """Compile as `Part`, and remember the types of calls, in this thread, which must have numba's lock."""
     own, before_typing = vars(dispatcher.targetctx.codegen()), _FUNCTION.get_call_type
     before = own.copy()
     own.update(_library_class=Part, set_env=_no_environment)

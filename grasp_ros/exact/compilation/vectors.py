@@ -1,6 +1,6 @@
 """Several numbers at once: vectors that kernels load, combine and store, each operation one or two instructions.
 
-Sums that are written out become vector instructions where the compiler finds them; a vector is one by its type. Each of
+The compiler turns written-out sums into vector instructions where it finds them; a `Vector` always. Each of
 its numbers has the bits that it would have alone. A vector has eight numbers, or four: where a loop keeps ten sums,
 eight of each are more than a processor with AVX2 has registers for.
 

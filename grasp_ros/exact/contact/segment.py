@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.automaton.begin import leaves_force_out, speed_of_pair
-from grasp_ros.exact.automaton.edge import LOWEST, difference, impact_beside
+from grasp_ros.exact.automaton.edge import LOWEST, difference, other_push
 from grasp_ros.exact.automaton.friction import slide_in_contact
 from grasp_ros.exact.compensated import add, keep_together, move_arm_in_contact, move_in_flight
 from grasp_ros.exact.compilation.jit import inlined, kernel, whole
@@ -112,7 +112,7 @@ def is_blurred(tables: Tables, plant: Plant, n: int, side: Body, candidate: Cand
 
 @inlined
 def clear_end(tables: Tables, plant: Plant, n: int, left: Candidate, right: Candidate, h: float) -> float:
-    """Where a step of length h ends for its pairs: at their first event, or half-way if that is blurred from here."""
+    """End of a step of length h by its pairs: at their first event, or half-way to it if it `is_blurred`."""
     s = min(h, left.when, right.when)
     if s < h and (is_blurred(tables, plant, n, LEFT, left, s) or is_blurred(tables, plant, n, RIGHT, right, s)):
         s *= 0.5
@@ -147,9 +147,9 @@ def step_ends(tables: Tables, plant: Plant, state: State, segment: Segment, work
 
 @inlined
 def cut_step(tables: Tables, plant: Plant, state: State, segment: Segment, ends: Ends, span: float) -> Segment:
-    """A step until its first event, the end of the span, or until the force of a pair that begins shows.
+    """Cut a step at its first event, the end of the span, or the end of a force-free begin.
 
-    The values at its end, and how far the lanes have come, are left in `tables.at`.
+    The values at its end, and the changes of the lanes, are left in `tables.at`.
     """
     c, at, step, s = tables.c, tables.at, segment.step, ends.known
     if math.isnan(s):
@@ -168,9 +168,9 @@ def cut_step(tables: Tables, plant: Plant, state: State, segment: Segment, ends:
 
 @kernel
 def force_free_length(tables: Tables, plant: Plant, state: State, n: int, s: float) -> float:
-    """Part of a step until s in which a pair that begins may be without its force: the longest before one that is not.
+    """Length, at most s, of a step in which the force of a BEGINNING pair is negligible.
 
-    It is doubled from a small one: at a later time a pair that has been beyond the bound may be within it again.
+    It is doubled from a small one until `may_last` is False: later, a pair may be within the bound again.
     """
     part, left, right = power_of_two(-MOST_HALVINGS), blur(plant, state, LEFT), blur(plant, state, RIGHT)
     while part < 1.0:
@@ -183,17 +183,17 @@ def force_free_length(tables: Tables, plant: Plant, state: State, n: int, s: flo
 
 @kernel
 def blur(plant: Plant, state: State, side: Body) -> float:
-    """Rounding of u'' at the begin of a step, m/s^2, of a pair that begins beside one in contact; 0 of any other."""
+    """Rounding of u'' of a BEGINNING pair at the begin of a step, m/s^2; 0 of any other pair."""
     if state.mode[side] != Pair.BEGINNING:
         return 0.0
-    return DERIVATIVE * (difference(plant, state.y, side, LOWEST)[1] + abs(impact_beside(plant, state, side)[0]))
+    return DERIVATIVE * (difference(plant, state.y, side, LOWEST)[1] + abs(other_push(plant, state, side)[0]))
 
 
 @inlined
 def may_last(plant: Plant, state: State, side: Body, at: Array, blurred: float) -> bool:
-    """Whether a pair that begins has neither come back at the values `at`, nor a force that shows there.
+    """Whether a BEGINNING pair has neither opened again at the values `at` nor a force that matters there.
 
-    By more than the rounding of u in m, and of u' in m/s: of u'' it has the one that is `blurred`, which adds up.
+    The rounding of u in m and u' in m/s is allowed; `blurred`, that of u'' in m/s^2, adds up over the step.
     """
     if state.mode[side] != Pair.BEGINNING:
         return True
@@ -209,7 +209,7 @@ def may_last(plant: Plant, state: State, side: Body, at: Array, blurred: float) 
 def has_not_begun(plant: Plant, state: State, side: Body, at: Array, flight: Flight) -> bool:
     """Whether arm and object of a pair that begins at rest have moved alike in a step, but for the rounding of u''.
 
-    Told by what the step adds to both, which has digits of its own.
+    Their changes are compared: these have smaller roundings.
     """
     if state.mode[side] != Pair.BEGINNING or not is_resting(state.y, side):
         return False
@@ -220,7 +220,7 @@ def has_not_begun(plant: Plant, state: State, side: Body, at: Array, flight: Fli
 
 @inlined
 def move_by_step(tables: Tables, plant: Plant, segment: Segment, state: State) -> None:
-    """Move the state on to the end of a step, whose values stand in `tables.at`; what nothing moves stays together."""
+    """Move the state to the end of a step, whose values are in `tables.at`; pairs that move alike stay at u = 0."""
     at, (left, right, _) = tables.at, segment.flights
     alike_l = state.mode[LEFT] == Pair.RESTING or has_not_begun(plant, state, LEFT, at, left)
     alike_r = state.mode[RIGHT] == Pair.RESTING or has_not_begun(plant, state, RIGHT, at, right)

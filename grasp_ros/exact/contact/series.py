@@ -64,7 +64,7 @@ def accelerations(bodies: tuple[PerMass, PerMass, PerMass], one: float, x_o: flo
 
 
 @kernel
-def put(table: Array, i: int, x: Lanes) -> None:
+def store_eight(table: Array, i: int, x: Lanes) -> None:
     """Store eight neighbouring numbers."""
     table[i], table[i + 1], table[i + 2], table[i + 3] = x[0], x[1], x[2], x[3]
     table[i + 4], table[i + 5], table[i + 6], table[i + 7] = x[4], x[5], x[6], x[7]
@@ -81,7 +81,7 @@ def with_ends(total: float, a: tuple[float, float, float, float], b: tuple[float
 
 @inlined
 def scale_of(unit: float) -> float:
-    """The power of two of a unit; 1 for one so large that nothing moves but numbers at the end of their range."""
+    """The power of two of a unit; 1 above 2^LARGEST, where only numbers near the limits of doubles move."""
     e = exponent(unit)
     return power_of_two(e) if e <= LARGEST else 1.0
 
@@ -122,8 +122,8 @@ def expand_one(c: Array, f: Array, bodies: Array, pairs: Array, side: int, unit:
         gl = with_ends(gl, (first[2], second[2], before[2], a_l), ends)
         gr = with_ends(gr, (first[3], second[3], before[3], a_r), ends)
         go = with_ends(go, (first[4], second[4], before[4], a_o), ends)
-        put(f, FACTORS * k, (v_o, d_open, a_l, a_r, a_o, w, u, e))
-        put(f, FACTORS * k + SECOND, (w, w, w, w, w, w, u, g))
+        store_eight(f, FACTORS * k, (v_o, d_open, a_l, a_r, a_o, w, u, e))
+        store_eight(f, FACTORS * k + SECOND, (w, w, w, w, w, w, u, g))
         if k == 0:
             first, w_end, u_end = now, 2.0 * w, 2.0 * u
         elif k == 1:
@@ -138,7 +138,7 @@ def expand_one(c: Array, f: Array, bodies: Array, pairs: Array, side: int, unit:
         v_l, v_r = 2.0 * step * fma(-push_l, z, gl), 2.0 * step * fma(push_r, z, gr)
         v_o = 2.0 * step * fma(push_o, z, go)
         z_l, z_r = (w, gap) if on_left else (gap, w)
-        put(c, LANES * (k + 1), (time, v_l, x_o, v_o, 0.0, v_r, z_l, z_r))
+        store_eight(c, LANES * (k + 1), (time, v_l, x_o, v_o, 0.0, v_r, z_l, z_r))
 
 
 @inlined
@@ -178,10 +178,10 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
         wd_l, wd_r = fma(d_l, b[2], fma(a[6], s_r, wd_l)), fma(d_r, b[1], fma(a[7], s_l, wd_r))
         gv, gl = fma(v_o, b[0], fma(a[0], g, gv)), fma(a_l, b[0], fma(a[1], g, gl))
         gr, go = fma(a_r, b[0], fma(a[2], g, gr)), fma(a_o, b[0], fma(a[3], g, go))
-        put(f, FACTORS * k, (v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r))
-        put(f, FACTORS * k + 8, (w_l, w_r, u_l, u_r, q_l, q_r, e_l, e_r))
-        put(f, FACTORS * k + SECOND, (g, g, g, g, s_r, s_l, s_r, s_l))
-        put(f, FACTORS * k + SECOND + 8, (w_l, w_r, u_l, u_r, s_r, s_l, g_l, g_r))
+        store_eight(f, FACTORS * k, (v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r))
+        store_eight(f, FACTORS * k + 8, (w_l, w_r, u_l, u_r, q_l, q_r, e_l, e_r))
+        store_eight(f, FACTORS * k + SECOND, (g, g, g, g, s_r, s_l, s_r, s_l))
+        store_eight(f, FACTORS * k + SECOND + 8, (w_l, w_r, u_l, u_r, s_r, s_l, g_l, g_r))
         if k == 0:
             a = (v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r, q_l, q_r, e_l, e_r)
             w_end_l, w_end_r, u_end_l, u_end_r = 2.0 * w_l, 2.0 * w_r, 2.0 * u_l, 2.0 * u_r
@@ -192,7 +192,7 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
         s_l, s_r = scale * w_l, scale * w_r
         v_l, v_r = twice * fma(-left[0], z_l, gl), twice * fma(right[0], z_r, gr)
         v_o = twice * fma(middle[0], z_l - z_r, go)
-        put(c, LANES * (k + 1), (twice * g, v_l, x_o, v_o, 0.0, v_r, w_l, w_r))
+        store_eight(c, LANES * (k + 1), (twice * g, v_l, x_o, v_o, 0.0, v_r, w_l, w_r))
 
 
 @kernel

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from grasp_ros.exact.automaton.edge import impact_beside
+from grasp_ros.exact.automaton.edge import other_push
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.impact import stored_energy
 from grasp_ros.exact.kinematics import approach, other, reduced_mass, relative_motion
@@ -31,9 +31,9 @@ def series_order(tolerance: float) -> int:
 
 
 def higher_order(order: int) -> int:
-    """That of steps with both pairs in contact, one and a half times the one of steps with one; even.
+    """Order of steps with both pairs in contact: one and a half times that with one pair; even.
 
-    These steps cost more beside their series, and bodies that swing against each other take nothing else: with the
+    These steps cost more outside their series, and bodies that swing against each other take nothing else: with the
     lower order a quarter more of them, in the same time.
     """
     return 2 * ((3 * order + 2) // 4)
@@ -73,9 +73,9 @@ def rate_bound(bodies: Array) -> float:
 
 @kernel
 def new_settings(tolerance: float, highest: int, given: Array) -> Settings:
-    """What the accuracy of a run rests on; the workspace holds series of the `highest` order, that with both pairs.
+    """Settings of a run; the workspace holds series up to the order `highest`, that of steps with both pairs.
 
-    Its terms must have fallen by two thirds of the order with one pair: later, they are large beside what moves.
+    Their terms must be small at 2/3 of the order with one pair already, see `taylor_step.step_size`.
     """
     one = lower_order(highest)
     both = new_order(tolerance, highest, max(lower_order(one), LEAST))
@@ -84,17 +84,17 @@ def new_settings(tolerance: float, highest: int, given: Array) -> Settings:
 
 @inlined
 def impact_scales(hertzian: float, mu: float, u: float, d: float) -> tuple[float, float]:
-    """Scales of sqrt(u) and u' of an impact: those at which a free impact has the same energy (O1 read backwards)."""
+    """Scales of sqrt(u) and u' of an impact: the largest of a free impact of this energy (docs/oracles.md, O1)."""
     energy = 0.5 * mu * d * d + stored_energy(hertzian, u)
     return power_of_two_root(2.5 * energy / hertzian, 5), power_of_two_root(2.0 * energy / mu, 2)
 
 
 @inlined
 def turning_rate(plant: Plant, state: State, side: Body) -> tuple[float, float]:
-    """Scale of w of a pair in contact, and the rate at which w turns in its own regularised time.
+    """Scale of w of a pair in contact, and the rate at which w turns in its own regularised time, dt = 2 w ds.
 
-    dt = 2 w ds: like an impact, with v / w; under a steady acceleration a with sqrt(2 a); under the dissipation with
-    2 p H w^4 / mu. The other pair pushes, too.
+    In an impact the rate is v / w; under a constant acceleration a, the other pair's push included, sqrt(2 a); under
+    dissipation 2 p H w^4 / mu.
     """
     hertzian, mu, u = plant.pairs[side, Law.HERTZIAN], reduced_mass(plant.bodies, side), state.y[U.L + side]
     d, a = relative_motion(plant, state.y, side)
@@ -102,7 +102,7 @@ def turning_rate(plant: Plant, state: State, side: Body) -> tuple[float, float]:
     a = abs(a)
     beside = other(side)
     if state.mode[beside] == Pair.CONTACT:
-        a += abs(impact_beside(plant, state, side)[0])
+        a += abs(other_push(plant, state, side)[0])
     rate = max(v * near_inverse(w) if w > 0.0 else 0.0, math.sqrt(2.0 * a))
     stiff = plant.pairs[side, Law.DISSIPATION] * hertzian / mu
     return w, max(rate, 2.0 * stiff * (u * u))
@@ -110,7 +110,7 @@ def turning_rate(plant: Plant, state: State, side: Body) -> tuple[float, float]:
 
 @inlined
 def reach_of_span(state: State, left: bool, right: bool, unit: float, span: float) -> float:
-    """About the s / unit at which a contact has lasted for a span in s: dt = 2 G ds, with G and G' as they begin."""
+    """Estimate of s / unit after a span, in seconds, of contact: dt = 2 G ds, with G and G' at the start."""
     y, g, bend = state.y, 1.0, 0.0
     if left:
         g, bend = math.sqrt(y[U.L]), approach(y, LEFT)
@@ -134,9 +134,9 @@ def outlasts(y: Array, w_l: float, w_r: float, unit: float, span: float, reach: 
 
 @inlined
 def within_decay(plant: Plant, mode: Integers, span: float) -> float:
-    """A span in s, or the part of it in which a damper leaves enough of a velocity for its series to have digits.
+    """A span in seconds, or the part of it after which a damper would leave too few digits of a velocity's series.
 
-    An arm that touches nothing flies.
+    A free arm has a closed form.
     """
     for body in (LEFT, OBJECT, RIGHT):
         damping, mass = plant.bodies[body, Of.DAMPING], plant.bodies[body, Of.MASS]
@@ -149,8 +149,8 @@ def within_decay(plant: Plant, mode: Integers, span: float) -> float:
 def new_step(plant: Plant, state: State, settings: Settings, span: float) -> Step:
     """A step from here, in a unit of s in which its coefficients neither grow nor shrink by many decades.
 
-    With both pairs in contact dt = 2 w_l w_r ds: each turns at its rate times the w of the other one. A step that a
-    span will end needs fewer orders.
+    With both pairs in contact dt = 2 w_l w_r ds: each w turns at its rate times the other w. A step that is cut by the
+    span needs a lower order.
     """
     left, right = state.mode[LEFT] == Pair.CONTACT, state.mode[RIGHT] == Pair.CONTACT
     w_l, rate_l, w_r, rate_r = 1.0, 0.0, 1.0, 0.0

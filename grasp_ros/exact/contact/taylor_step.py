@@ -1,4 +1,4 @@
-"""One Taylor step in regularised time: its series, its unit, and the length for which it neglects nothing.
+"""One Taylor step in regularised time: its series, its unit, and the length that the accuracy allows.
 
 Source of the length: A. Jorba, M. Zou, A software package for the numerical integration of ODEs by means of high-order
 Taylor methods, Experimental Mathematics 14 (2005), section 3.2.
@@ -10,7 +10,7 @@ import math
 
 from grasp_ros.exact.compilation.jit import inlined
 from grasp_ros.exact.compilation.vectors import highest, larger, load, numbers_of, sizes
-from grasp_ros.exact.contact.series import FIRST, expand_both, expand_one, put, scale_of
+from grasp_ros.exact.contact.series import FIRST, expand_both, expand_one, scale_of, store_eight
 from grasp_ros.exact.kinematics import own_size
 from grasp_ros.exact.numerics.polynomial import INVERSE, curvatures, values
 from grasp_ros.exact.numerics.powers_of_two import near_exp2, near_inverse, near_log2, orders_to_one, power_of_two
@@ -19,8 +19,8 @@ from grasp_ros.exact.tolerances import DEFECT, STILL
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Lane, Pair, U, V, Work, X, Z
 
 TAIL = 5  # at a touch with p = 0 only every fifth coefficient differs from zero
-SMALLEST = 1e-290  # of what moves
-BELOW, ABOVE = 0.5, 2.0  # parts of a reach beyond which what moves in a step is not what moves within the reach
+SMALLEST = 1e-290  # of a change
+BELOW, ABOVE = 0.5, 2.0  # length / reach, between which the changes within the reach hold for the step
 FAR_BELOW, FAR_ABOVE = 2.0**-10, 2.0**5  # steps whose unit does not fit; a small unit lets terms underflow
 MOST = 16  # binary orders by which a unit is changed at once
 MAX_UNITS, MOST_FITS = 200, 4
@@ -51,8 +51,8 @@ def growth_up_to(c: Array, inverse: Array, n: int) -> float:
 def step_size(c: Array, inverse: Array, order: Order) -> float:
     """Step in s / unit at which the first neglected term of a lane is the tolerated part of its size, or inf.
 
-    The terms of a high order must fall on the way, too: 52 of an exponential function neglect nothing at ten time
-    constants, but some of them are thousands of times as large as what moves.
+    With a high order earlier terms must be small, too: 52 terms of an exponential function suffice for ten time
+    constants, but some of them are thousands of times as large as the change.
     """
     n = order.number
     last = numbers_of(sizes(load(c, LANES * n)))
@@ -111,11 +111,11 @@ def inverse(size: float) -> float:
 
 @inlined
 def length(tables: Tables, pulled: tuple[float, float, float], step: Step, settings: Settings, reach: float) -> float:
-    """Step in s / unit at which what is neglected is `tolerance` times what moves within `reach`; `pulled`: of `pulls`.
+    """Step in s / unit at which the neglected term is `tolerance` times the change within `reach`; `pulled`: `pulls`.
 
-    A velocity moves by the largest of three: what the step's motion makes of it, the rounding of the terms of its
-    equation, and a part of the rounding of the fastest velocity. A position moves with its velocity. The product
-    has a test of its own.
+    The change of a velocity is the largest of three: that in the step, the rounding of the terms of its equation, and
+    a part of the rounding of the fastest velocity. A position changes with its velocity. `is_exact` tests the lane
+    CHECK.
     """
     c = tables.c
     t, v_l, x_o, v_o, _, v_r, z_l, z_r = motion_sizes(c, reach)
@@ -127,7 +127,7 @@ def length(tables: Tables, pulled: tuple[float, float, float], step: Step, setti
     z_l = depth_size(c[Z.L], step.left, z_l, t * (v_l + v_o))
     z_r = depth_size(c[Z.R], step.right, z_r, t * (v_o + v_r))
     parts = (inverse(t), inverse(v_l), inverse(x_o), inverse(v_o), 0.0, inverse(v_r), inverse(z_l), inverse(z_r))
-    put(tables.size, FIRST, parts)
+    store_eight(tables.size, FIRST, parts)
     return step_size(c, load(tables.size, FIRST), step.order)
 
 
@@ -136,9 +136,9 @@ def fitted_step(tables: Tables, plant: Plant, state: State, settings: Settings, 
                 ) -> tuple[Step, float]:
     """A step with its series, in its unit or in one that fits them, and its length in that unit, or nan.
 
-    Most units do at once. Coefficients of a wrong one leave the range of numbers, so the next follows from the length;
-    where they vanish, the end of the span or a release ends the step. One that has been changed is changed until the
-    step is about 1, so that it is the same however far off it was.
+    Most units fit at once. Coefficients of a wrong one over- or underflow, so the next unit follows from the length;
+    if they vanish, the end of the span or a release ends the step. A changed unit is changed until the step is about
+    1, so that the result does not depend on the first unit.
     """
     pulled = pulls(plant, state.y)  # before the series: quotients after it would be waited for
     fits = 0
@@ -165,10 +165,10 @@ def fitted_step(tables: Tables, plant: Plant, state: State, settings: Settings, 
 
 @inlined
 def is_exact(tables: Tables, step: Step, h: float, tolerance: float) -> bool:
-    """Whether a step of length h neglects nothing: the values at its end, and the sizes on the way, are known.
+    """Whether a step of length h passes the defect test; `tables.at` and `tables.size` are those at h.
 
-    G = w_l w_r, times the power of two of the unit, or u = w^2 with one side in contact is expanded beside w: its
-    defect at the end of the step consists of neglected terms only.
+    G = w_l w_r, times the power of two of the unit, or u = w^2 with one side in contact is the lane CHECK: at the end
+    of the step it differs from the product of w by neglected terms.
     """
     c, at, size = tables.c, tables.at, tables.size
     scale = scale_of(step.unit) if step.left and step.right else 1.0

@@ -43,7 +43,7 @@ def address_of(function: Any) -> int:
 
 
 def block_of(record: Any) -> Integers:
-    """A record of arrays, and of records of them, as kernels have it in memory; it holds for as long as they live."""
+    """Memory image, as in kernels, of a record of arrays or of records of them; valid as long as these live."""
     block = np.array([*_words(record)])
     if not COMPILED:
         _RECORDS[block.ctypes.data] = record
@@ -55,7 +55,7 @@ def _words(record: Any) -> Iterator[int]:
     for part in record:
         if isinstance(part, tuple):
             yield from _words(part)
-        else:  # owners, of which there are none, numbers, bytes of one, address, shape, bytes to the next
+        else:  # a numba array: meminfo, parent (none), size, itemsize, data, shape, strides
             yield from (0, 0, part.size, part.itemsize, part.ctypes.data, *part.shape, *part.strides)
 
 

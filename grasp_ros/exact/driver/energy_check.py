@@ -20,8 +20,8 @@ own_energy = kernel(body_energy)
 def level_of(body: Array, x: float, v: float, way: float, t: float) -> tuple[float, float]:
     """Energy in J of V of a body (4,) at the end of a segment of t s, and the sum of the sizes of its terms.
 
-    An arm that touches the object takes its place, with the roundings of a `way` in m. A force that carries the body
-    away and a weak spring that brings it back leave small terms at both ends.
+    A position set to the object's has the rounding of its `way` in m. If a force carries a body away, and a weak spring
+    brings it back, the terms at both ends are smaller than between them.
     """
     mass, stiffness, force = body[Of.MASS], body[Of.STIFFNESS], body[Of.FORCE]
     value, size = own_energy(mass, stiffness, force, x, v, abs(x) + way)
@@ -33,7 +33,7 @@ def level_of(body: Array, x: float, v: float, way: float, t: float) -> tuple[flo
 
 @inlined
 def energy_level(plant: Plant, state: State, t: float) -> Level:
-    """V_c - 2 sum f x at the end of a segment of t s. Dry friction is left out, because it only takes."""
+    """V_c - 2 sum f x at the end of a segment of t s, without dry friction, which only takes energy."""
     y, given = state.y, plant.given
     value, size = level_of(given[OBJECT], y[X.O], y[V.O], 0.0, t)
     way = abs(y[X.O]) + t * abs(y[V.O])
@@ -70,10 +70,10 @@ def losses(plant: Plant, before: Level, modes: tuple[int, int], size: float, t: 
 
 @inlined
 def penetrates(plant: Plant, state: State, side: Body, before: float, size: float, t: float, part: float) -> bool:
-    """Whether an open pair is closed by more than roundings and a `part` of its ways in t s: a touch has been missed.
+    """Whether an open pair has u > 0 by more than rounding and `part` of its travel in t s: a touch has been missed.
 
-    A body goes no faster than the energy `size` allows. What has DIED_OUT is not followed. A u > 0 that was there
-    `before` is no missed touch: roundings of a longer way may have left it.
+    A body is no faster than the energy `size` allows. A u below DIED_OUT is ignored. A u > 0 that was there `before` is
+    no missed touch: it may be the rounding of a longer travel.
     """
     u = state.y[U.L + side]
     if state.mode[side] != Pair.OPEN or u <= max(before, 0.0):

@@ -27,7 +27,7 @@ measured, feedback, limited = kernel(control.measured), kernel(control.feedback)
 def answer(state: State, loop: Loop, k: int) -> bool:
     """Write what the controllers answer to the state at the begin of interval k; whether all of it is a number.
 
-    What a scene's own law makes of a state that overflows is not refused here: it ends the run with its status.
+    A scene's own law may answer inf or nan to a state that overflows: the run then ends with a status.
     """
     for side in (LEFT, RIGHT):
         callee, row = loop.callee[side], loop.laws[side]
@@ -78,7 +78,7 @@ def open_interval(plant: Plant, state: State, loop: Loop) -> bool:
 
 @inlined
 def enter_interval(plant: Plant, state: State, loop: Loop, out: Output, grid: Array) -> Output:
-    """Modes under the inputs of an interval that begins or goes on; what it writes: the output times up to its end."""
+    """Set the modes of an interval that begins or resumes; returns `out` with the output times up to its end."""
     end = loop.bounds[loop.place[Place.INTERVAL] + 1]
     out = Output(grid[:end], out.rows, out.events, out.filled, out.work, out.observer)
     begin_interval(plant, state, out)
@@ -87,7 +87,7 @@ def enter_interval(plant: Plant, state: State, loop: Loop, out: Output, grid: Ar
 
 @inlined
 def rest(state: State, loop: Loop) -> None:
-    """Let what is left of an interval pass. It is rest until a segment moves; a controller may answer anew."""
+    """Skip what is left of an interval at rest; with controllers no time of rest is kept: they may move it."""
     put(state, V.L, 0.0)
     put(state, V.O, 0.0)
     put(state, V.R, 0.0)

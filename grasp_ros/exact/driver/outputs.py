@@ -1,4 +1,4 @@
-"""What a run writes: states at the output times, events, and the budgets and waits that limit it."""
+"""What a run writes, states at the output times and events, and the budgets that limit it."""
 
 from __future__ import annotations
 

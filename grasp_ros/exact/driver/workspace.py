@@ -1,4 +1,4 @@
-"""What the kernels write to before they read: a run borrows it, so that runs at the same time have their own."""
+"""Scratch memory of the kernels: each run borrows its own, so that runs can be concurrent."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Workspace(NamedTuple):
     events: Array  # (EVENT_ROWS, 5)
 
 
-_FREE: dict[float, list[Workspace]] = {}  # by accuracy; what nobody uses
+_FREE: dict[float, list[Workspace]] = {}  # unused ones by accuracy
 
 
 def new_workspace(order: int) -> Workspace:

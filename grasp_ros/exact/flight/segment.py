@@ -56,7 +56,7 @@ def pair_candidate(row: Array, plant: Plant, state: State, flights: Flights, sid
                    work: Integers) -> tuple[Candidate, float]:
     """First event of one pair in a flight of at most `span` seconds, unless it is later than `until`.
 
-    And the time up to which it is known, as `first_root` says.
+    The second value is the time at which `first_root` gave up.
     """
     mode, y = state.mode[side], state.y
     if mode in (Pair.RESTING, Pair.ABSENT, Pair.BEGINNING):
@@ -97,7 +97,7 @@ def fly_free(plant: Plant, state: State, span: float, work: Integers) -> Segment
 
 @inlined
 def flight_ends(row: Array, plant: Plant, state: State, segment: Segment, work: Integers) -> Ends:
-    """First events of the pairs and of the object within a flight, in s; it is known until the force of one shows.
+    """First events of pairs and object in a flight, in s; `known` is also the end of a search or a begin.
 
     `row` is scratch.
     """

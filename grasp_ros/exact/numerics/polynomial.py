@@ -21,7 +21,7 @@ INVERSE = np.array([0.0, *(1.0 / n for n in range(1, 100))])  # a quotient would
 
 @inlined
 def ways(c: Array, n: int, s: float) -> Array:
-    """How far the lanes come on the way to s, of the even degree n."""
+    """Changes of the lanes from 0 to s, of the even degree n."""
     square = s * s
     even, odd = load(c, LANES * n), load(c, LANES * (n - 1))
     for k in range(n - 2, 0, -2):
@@ -32,7 +32,7 @@ def ways(c: Array, n: int, s: float) -> Array:
 
 @inlined
 def values(c: Array, n: int, s: float, at: Array) -> None:
-    """Write the lanes' values at s, of the even degree n, to `at` (2 LANES,), and behind them how far they have come.
+    """Write the lanes' values at s, of the even degree n, to `at` (2 LANES,), and behind them their changes.
 
     The constant comes last and is rounded with one sum, so that many short steps lose nothing systematically.
     """
@@ -55,7 +55,7 @@ def curvatures(c: Array, n: int, s: float, size: Array) -> None:
 
 @inlined
 def lane_range(c: Array, size: Array, lane: int, s: float, end: float) -> tuple[float, float]:
-    """Bounds (low, high) of a lane in (0, s], in proportion to the distance from its value c_0 at 0.
+    """Ends (low, high) at s of two lines from c_0 at 0, between which a lane stays in (0, s].
 
     With `end` = f(s) and size = sum of |c_k| s^k over k >= 2, the terms of one sign beyond the linear one lie between 0
     and half of their signed and absolute sums: f stays between the lines from c_0 to `low` and to `high`.

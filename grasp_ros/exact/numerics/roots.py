@@ -103,8 +103,8 @@ def first_rise(f: Array, n: int, h: float, noise: float, work: Integers) -> floa
     The second derivative is bounded by sums of |f_k|, so the steps of `safe_step` cannot jump over a root, until f
     is known to increase all the way to h. Within `noise`, or the rounding noise of its terms there, f counts as zero.
     An exact zero at 0 is no root. A double one is, if f rises from it; so is 0 if f rises from above the noise, where
-    a step before ended within it. Where many steps lead nowhere, because large terms cancel, f is expanded anew about
-    where they got to. f is lost.
+    a step before ended within it. After MAX_STEPS, because large terms cancel, f is expanded anew about the point
+    reached. f is overwritten.
     """
     degree = n
     n = without_zeros(f, n)
