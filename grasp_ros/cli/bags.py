@@ -107,7 +107,7 @@ def _verify(options: argparse.Namespace) -> int:
     prepare()
     found = verify(recording)
     rows = [("bag", str(recording.path)), ("run", recording.running.words),
-            ("recorded", f"{recording.t[-1]:g} s of {recording.scene.duration:g} s; end: {recording.lost['end']}"),
+            ("recorded", f"{report.recorded_span(recording)}; end: {recording.lost['end']}"),
             *report.describe_verification(found)]
     show(options, report.table(rows), {"bag": str(recording.path), "lockstep": recording.running.lockstep,
                                        **verified(found)})

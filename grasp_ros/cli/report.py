@@ -16,6 +16,7 @@ from grasp_ros.physics.layout import Body, Entry, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
+from grasp_ros.scene.topics import LYAPUNOV_NAMES
 from grasp_ros.simulation import Trajectory
 from grasp_ros.simulation.chunk import SETTLED
 from grasp_ros.simulation.summary import MOTION, OUTPUTS, TICKS
@@ -126,7 +127,9 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
     left, right = found["contacts"].values()
     balanced, known = found["balanced_ticks"], not np.isnan(found["work_J"])
     lacks = balanced < found["ticks"]  # numbers of the monitor
-    none = "unknown: lyapunov missing" if lacks else "none: the law of a controller is not known"
+    unknown = np.count_nonzero(recording.lyapunov[:, LYAPUNOV_NAMES.index("closed")] != 1.0)
+    none = "unknown: lyapunov missing" if lacks else (
+        f"none: at {unknown} of {found['ticks']} ticks the commands are not those of a known law")
     closes = "closes at every tick" if known else f"closes at {balanced} ticks, others are not known"
     rows = [
         ("bag", found["bag"]),
@@ -135,8 +138,7 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
         ("feedback", found["feedback"]),
         ("run", recording.running.words + (f", {resets} resets" if resets else "")),
         *_timing(found),
-        ("recorded", (f"{found['begin_s']:g} to " if found["begin_s"] else "") + f"{found['duration_s']:g} s of"
-                     f" {found['scene_duration_s']:g} s" + (f", in {resets + 1} runs of the scene" if resets else "")),
+        ("recorded", recorded_span(recording)),
         ("messages", _messages(found["topics"])),
         ("contacts left, right", f"{left}, {right} seen at the ticks"),
         (f"V{of}", _ends(found["V_J"])), (f"V_c{of}", _ends(found["V_c_J"])),
@@ -152,6 +154,13 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
         values = ", ".join(f"{name} {number:g}" for name, number in numbers.items())
         rows.append((f"set at {recording.scene.time_of(tick):g} s", values))
     return _with_words(recording.scene, rows, other=not recording.closed or bool(recording.changes))
+
+
+def recorded_span(recording: Recording) -> str:
+    """Which part of a scene a bag has, and in how many runs of it."""
+    begin, end, runs = recording.t[0], recording.t[-1], len(recording.starts)
+    return (f"{begin:g} to " if begin else "") + f"{end:g} s of {recording.scene.duration:g} s" + (
+        f", in {runs} runs of the scene" if runs > 1 else "")
 
 
 def describe_verification(verification: Verification) -> list[Row]:
