@@ -29,6 +29,7 @@ from grasp_ros.observe.record import (
     memory_of,
 )
 from grasp_ros.observe.settling import settled_from, watch_bound
+from grasp_ros.physics.control import Column
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of, Pair, U, X
 
 BEGIN = -2  # in place of a kind of segment
@@ -243,7 +244,7 @@ def watch(integrator: Integrator, wanted: Wanted, bound: float) -> RunObserver:
     if integrator.continuous:
         memory.base[:], memory.switches[Switch.CERTAIN] = memory.loop, not system.caveats
         for side, law in system.laws.items():
-            memory.gains[side] = law.position_gain, law.velocity_gain
+            memory.gains[side] = law.row[: Column.SET_POINT]
     run_observer.begin(bound)
     integrator.observer = run_observer
     return run_observer

@@ -111,26 +111,6 @@ class ControlLaw:
         self.row[Column.LIMIT] = np.inf
         self.seed: tuple[int, int] | None = None
 
-    @property
-    def position_gain(self) -> float:
-        """Kp, N/m."""
-        return float(self.row[Column.POSITION_GAIN])
-
-    @property
-    def velocity_gain(self) -> float:
-        """Kv, N s/m."""
-        return float(self.row[Column.VELOCITY_GAIN])
-
-    @property
-    def set_point(self) -> float:
-        """Where the feedback aims at, m."""
-        return float(self.row[Column.SET_POINT])
-
-    @property
-    def feed_forward(self) -> float:
-        """Constant force, N."""
-        return float(self.row[Column.FEED_FORWARD])
-
     def noise(self, tick: int) -> Array:
         """Standard normal numbers (2,) of a tick; 0 without noise."""
         return NO_NOISE if self.seed is None else normals(*self.seed, tick // BLOCK)[tick % BLOCK]

@@ -58,8 +58,7 @@ def energy(system: System, state: Array, external: Array | None = None, *, feedb
     external = None if external is None else given.rows("external", external, 3)
     given.check_rows(state=state, external=external)
     bodies = given.instance("system", system, System, "a System").closed_loop if feedback else system.bodies
-    V = _mechanical(system, bodies, state)
-    V_c = V
+    V = V_c = _mechanical(system, bodies, state)
     V_rate = _power(system, bodies, state, external)
     mode = np.zeros(np.shape(V), dtype=np.int64)
     for side, u, d in pairs_of(system, state):
@@ -121,14 +120,8 @@ def energy_balance(system: System, before: Array, after: Array, forces: Array) -
     return EnergyBalance(levels[1] - levels[0], work, rounding)
 
 
-def mechanical_level(system: System, body: int, state: Array, feedback: bool = True) -> Array:
+def mechanical_levels(bodies: Array, body: int, state: Array) -> tuple[Array, Array]:
     """Twice the kinetic energy and the potential of the linear terms of one body, in J; V_l, V_o or V_r of (29)."""
-    kinetic, potential = _levels(system.closed_loop if feedback else system.bodies, body, state)
-    return np.asarray(kinetic + potential)
-
-
-def _levels(bodies: Array, body: int, state: Array) -> tuple[Array, Array]:
-    """Twice the kinetic energy and the potential of one body."""
     x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
     stiffness, force = bodies[body, Of.STIFFNESS], bodies[body, Of.FORCE]
     potential: Array = np.zeros(np.shape(state)[:-1])
@@ -144,7 +137,7 @@ def _mechanical(system: System, bodies: Array, state: Array) -> Array:
     kinetic: Array = np.zeros(np.shape(state)[:-1])
     potential: Array = np.zeros(np.shape(state)[:-1])
     for body in system.present:
-        moving, held = _levels(bodies, body, state)
+        moving, held = mechanical_levels(bodies, body, state)
         kinetic, potential = kinetic + moving, potential + held
     return kinetic + potential
 
@@ -188,5 +181,4 @@ def _power(system: System, bodies: Array, state: Array, external: Array | None) 
 def pairs_of(system: System, state: Array) -> list[tuple[int, Array, Array]]:
     """Side, u in m and u' in m/s of every pair that can push, from states (..., 6)."""
     u_l, d_l, u_r, d_r = penetration(state)
-    found: dict[int, tuple[Array, Array]] = {LEFT: (u_l, d_l), RIGHT: (u_r, d_r)}
-    return [(side, *found[side]) for side in system.contacts]
+    return [(side, u_l, d_l) if side == LEFT else (side, u_r, d_r) for side in system.contacts]

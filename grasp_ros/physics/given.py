@@ -109,7 +109,8 @@ def _row(name: str, array: NDArray[Any]) -> NDArray[np.float64]:
     if array.ndim != 1:
         raise Refused(f"{name}: shape {array.shape} is not allowed; allowed: (n,)")
     if array.dtype.kind not in "fiu":
-        raise Refused(f"{name}: {_shown(array)} is not allowed; allowed: numbers (n,)")
+        first = f"{array.flat[0]!r}, {array.dtype}," if array.size else array.dtype
+        raise Refused(f"{name}: {first} is not allowed; allowed: numbers (n,)")
     return array.astype(np.float64)
 
 
@@ -177,11 +178,5 @@ def _array(name: str, values: Any) -> NDArray[Any]:
         raise Refused(f"{name}: {error}; allowed: numbers (n,)") from None
     if isinstance(values, np.ma.MaskedArray) and np.ma.getmaskarray(values).any():
         raise Refused(f"{name}: some are masked; allowed: numbers (n,)")
-    if array.dtype.kind == "O" and array.size and all(plain(entry) is not None for entry in array.flat):
-        return array.astype(np.float64)
-    return array.astype(np.float64) if array.size == 0 and array.dtype.kind == "O" else array
-
-
-def _shown(array: NDArray[Any]) -> str:
-    """The first entry, and its type."""
-    return f"{array.flat[0]!r}, {array.dtype}," if array.size else str(array.dtype)
+    numbers = array.dtype.kind == "O" and all(plain(entry) is not None for entry in array.flat)
+    return array.astype(np.float64) if numbers else array

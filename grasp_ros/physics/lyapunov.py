@@ -10,11 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.physics.energy import elastic_level, mechanical_level, pairs_of
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
+from grasp_ros.physics.energy import elastic_level, mechanical_levels, pairs_of
 from grasp_ros.physics.model import Array, Contact, in_contact
 from grasp_ros.physics.reach import reach
-from grasp_ros.physics.system import System
+from grasp_ros.physics.system import BODIES, System
 
 
 class Parts(NamedTuple):
@@ -32,15 +31,13 @@ def parts(system: System, state: Array, feedback: bool = True) -> Parts:
     """V of states (..., 6) by parts, 0 for what is not there; without `feedback` that of the plant alone."""
     state = np.asarray(state, dtype=float)
     zero: Array = np.zeros(np.shape(state)[:-1])
-    bodies = {
-        body: mechanical_level(system, body, state, feedback) if body in system.present else zero
-        for body in (LEFT, OBJECT, RIGHT)
-    }
-    touching: dict[int, Array] = {LEFT: zero, RIGHT: zero}
+    bodies, present = system.closed_loop if feedback else system.bodies, system.present
+    levels = [np.add(*mechanical_levels(bodies, body, state)) if body in present else zero for body in BODIES]
+    touching = [zero, zero]
     for side, u, d in pairs_of(system, state):
         held = in_contact(Contact(*system.pairs[side]), u, d)
         touching[side] = np.where(held, elastic_level(system, side, u), 0.0)
-    return Parts(bodies[LEFT], bodies[OBJECT], bodies[RIGHT], touching[LEFT], touching[RIGHT])
+    return Parts(*levels, *touching)
 
 
 def deformation(system: System, state: Array) -> Array:

@@ -9,7 +9,7 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from grasp_ros.physics.control import ControlLaw
+from grasp_ros.physics.control import Column, ControlLaw
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.system import COLUMN, NAMES, System
@@ -45,7 +45,7 @@ OBSERVABLES: dict[str, Callable[[Observation], float]] = {
     "v_other": lambda seen: seen.other()[1],  # its velocity, m/s
     "impact": lambda seen: seen.system.impact(seen.side, seen.state),  # force between the arm and the object, N
     "impact_other": lambda seen: seen.system.impact(opposite(seen.side), seen.state),  # of the other arm, N
-    "set_point": lambda seen: seen.laws[seen.side].set_point,  # of the feedback that the law replaces, m
+    "set_point": lambda seen: float(seen.laws[seen.side].row[Column.SET_POINT]),  # of the feedback it replaces, m
 }
 CALLABLE = f"a callable of tick, time, x and v, and by name of any of {', '.join(OBSERVABLES)}"
 _OF_OBJECT, _OF_OTHER = ("x_object", "v_object", "impact", "impact_other"), ("x_other", "v_other", "impact_other")

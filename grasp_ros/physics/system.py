@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.physics.control import ControlLaw, feedback
+from grasp_ros.physics.control import Column, ControlLaw, feedback
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of
 from grasp_ros.physics.model import Arm, Array, impact_force_of
 
@@ -111,9 +111,7 @@ class System:
 
     def arm(self, side: int) -> Arm:
         """An arm with the gains of its controller."""
-        mass, stiffness, damping, _ = self.bodies[side].tolist()
-        law = self.laws[side]
-        return Arm(mass, stiffness, damping, law.position_gain, law.velocity_gain)
+        return Arm(*self.bodies[side, : Of.FORCE].tolist(), *self.laws[side].row[: Column.SET_POINT].tolist())
 
     def external_at(self, tick: int) -> Array:
         """External forces (3,) in N from a tick to the next, by body."""

@@ -49,7 +49,8 @@ class Directions(NamedTuple):
             gain, damping, set_point, feed_forward = self.laws[side, :4]
             bodies[side, Of.STIFFNESS] += gain
             bodies[side, Of.DAMPING] += damping
-            bodies[side, Of.FORCE] += gain * law.set_point + law.position_gain * set_point + feed_forward
+            aim, stiffness = law.row[Column.SET_POINT], law.row[Column.POSITION_GAIN]
+            bodies[side, Of.FORCE] += gain * aim + stiffness * set_point + feed_forward
         return self._replace(bodies=bodies)
 
 

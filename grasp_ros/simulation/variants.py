@@ -104,7 +104,7 @@ class Variants:
         system, n = self.scene.system, self.rows
         laws = np.zeros((2, 4))
         for side, law in system.laws.items():
-            laws[side] = law.position_gain, law.velocity_gain, law.set_point, law.feed_forward
+            laws[side] = law.row[: Column.POSITION_NOISE]
         block = Block(*(np.repeat(array[None], n, axis=0) for array in (
             system.bodies, system.pairs, system.state[:, None], np.full((1, 1), system.coulomb), laws,
         )))

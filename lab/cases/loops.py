@@ -57,7 +57,7 @@ def _growth(period: float, delay: int, product: Product) -> float:
 
     It ends before the motion leaves the domain, or comes to rest.
     """
-    radius = spectral_radius(STANDARD, period, delay)
+    radius = float(spectral_radius(STANDARD, period, delay))
     half = min(HALF, int(math.log(GROWN) / abs(math.log(radius))))
     x = product.run(_alone(period, delay, 2 * half)).state[1:, 0]
     windows = np.lib.stride_tricks.sliding_window_view(x, 3 + delay)

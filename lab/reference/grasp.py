@@ -27,7 +27,7 @@ class Grasp(NamedTuple):
 def grasp_of(scene: Scene) -> Grasp:
     """The paper's grasp, with its gains, in a scene that is nothing else."""
     system = scene.system
-    if scene.values.keys() != PAPER or any(law.set_point or law.feed_forward for law in system.laws.values()):
+    if scene.values.keys() != PAPER or any(law.row[2:4].any() for law in system.laws.values()):
         raise Refused(f"{scene.name}: not the paper's grasp")
     left, right = (Contact(*pair) for pair in system.pairs.tolist())
     return Grasp(system.arm(LEFT), system.arm(RIGHT), left, right, float(system.bodies[OBJECT, Of.MASS]))

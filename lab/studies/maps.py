@@ -16,7 +16,7 @@ from grasp_ros.maps import store
 from grasp_ros.maps.plan import Axis, Plan
 from grasp_ros.maps.run import run
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.sampled import spectral_radii
+from grasp_ros.physics.sampled import spectral_radius
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.simulation.chunk import Setup
@@ -137,7 +137,7 @@ def limits(periods: int = PERIODS, levels: int = LEVELS) -> Limits:
     steps = np.round(np.linspace(FIRST_S, LAST_S, periods) * NANOSECONDS) / NANOSECONDS
     gains = np.linspace(1.0, 60.0, levels)
     arm = grasp_of(scene).left
-    radius = {delay: np.array([spectral_radii(arm._replace(position_gain=gain), steps, delay) for gain in gains])
+    radius = {delay: np.array([spectral_radius(arm._replace(position_gain=gain), steps, delay) for gain in gains])
               for delay in (0, 1)}
     loops = []
     for name, delay, noise in (("no delay", 0, {}), ("one sample of delay", 1, {}), ("noise", 0, NOISE),

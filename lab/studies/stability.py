@@ -11,7 +11,7 @@ import numpy as np
 from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.layout import LEFT, Of, V, X
 from grasp_ros.physics.model import Arm, Array
-from grasp_ros.physics.sampled import spectral_radii, spectral_radius
+from grasp_ros.physics.sampled import spectral_radius
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.simulation import SampledPlant
@@ -35,7 +35,7 @@ def first_limit(arm: Arm, delay: int) -> float:
     from scipy.optimize import brentq
 
     periods = np.geomspace(FIRST_S, LAST_S, SCAN)
-    above = spectral_radii(arm, periods, delay) >= 1.0
+    above = spectral_radius(arm, periods, delay) >= 1.0
     crossings = np.nonzero(above[1:] & ~above[:-1])[0]
     if not len(crossings):
         return math.inf
@@ -78,7 +78,7 @@ def curves(
     named = {f"delay of {limit.delay} periods": limit for limit in found if math.isfinite(limit.period)}
     last = 1.3 * max((limit.period for limit in named.values()), default=FIRST_S)
     periods = np.linspace(last / 300.0, last, 300)
-    radii = {label: (periods, spectral_radii(arm, periods, limit.delay)) for label, limit in named.items()}
+    radii = {label: (periods, spectral_radius(arm, periods, limit.delay)) for label, limit in named.items()}
     simulated = [check for limit in named.values() for check in limit.checks]
     simulated += [(h, simulated_growth(arm, h, limit.delay, 800)) for limit in named.values() for h in periods[30::45]]
     return radii, simulated, {label: limit.period for label, limit in named.items()}

@@ -65,7 +65,7 @@ def from_the_bag(recording: Recording, side: int, law: Any) -> list[float]:
         given = {
             "x_object": recording.state[row, 2], "v_object": recording.state[row, 3], "x_other": measured[other],
             "v_other": measured[other + 1], "impact": impacts[side][row], "impact_other": impacts[far][row],
-            "set_point": recording.scene.system.laws[side].set_point,
+            "set_point": recording.scene.system.laws[side].row[2],
         }
         assert given.keys() == set(OBSERVABLES)
         asked = type(law).__call__.__code__.co_varnames

@@ -106,7 +106,7 @@ def test_numbers_that_somebody_else_refuses_never_act(loop: tuple[Any, ...]) -> 
     refusing = [True]
 
     def acting() -> Any:
-        return controller._scene.system.laws[LEFT].position_gain
+        return controller._scene.system.laws[LEFT].row[0]
 
     def refuse(_: Any) -> SetParametersResult:
         return SetParametersResult(successful=not refusing[0], reason="not now")

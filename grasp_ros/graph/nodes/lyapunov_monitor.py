@@ -133,7 +133,8 @@ class LyapunovMonitor:
             x, v = tick.state.numbers[COLUMN[body] :][:2]
             expected = law.command(tick.time_ns // self._scene.period_ns, x, v)
             if force != expected:
-                size = abs(law.position_gain) * (abs(x) + abs(law.set_point)) + abs(law.velocity_gain * v)
-                if not abs(force - expected) <= EXPLAINED * (size + abs(law.feed_forward)):
+                position_gain, velocity_gain, set_point, feed_forward, *_ = law.row.tolist()
+                size = abs(position_gain) * (abs(x) + abs(set_point)) + abs(velocity_gain * v)
+                if not abs(force - expected) <= EXPLAINED * (size + abs(feed_forward)):
                     return False
         return True

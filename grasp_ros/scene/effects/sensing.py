@@ -43,7 +43,7 @@ def _odd(side: str, sections: Sections, system: System) -> Iterable[str]:
         if sections[f"{side}_feedback"][gain := GAINS[key.partition("_")[0]]] == 0.0:
             why = f"has no effect: {side}_feedback.{gain} is 0"
             yield oddity(f"{section}.{key}", value, why, "a gain that is not 0")
-    reach = max(map(abs, (*system.state[0::2].tolist(), system.laws[SIDES[side]].set_point)))
+    reach = max(map(abs, (*system.state[0::2].tolist(), float(system.laws[SIDES[side]].row[Column.SET_POINT]))))
     if wrong.get("position_step_m", 0.0) > 2.0 * reach > 0.0:
         why = f"measures 0 everywhere within {reach:g} m, where all bodies start"
         yield oddity(f"{section}.position_step_m", wrong["position_step_m"], why, "a smaller step")
