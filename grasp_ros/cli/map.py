@@ -58,7 +58,7 @@ def add_to(commands: Any) -> None:
 @needing("`grasp map`", "map")
 def _map(options: argparse.Namespace) -> int:
     from grasp_ros.maps import figures, store
-    from grasp_ros.maps.plan import Plan, check, read_axis
+    from grasp_ros.maps.plan import Plan, read_axis
     from grasp_ros.maps.run import run
 
     scene = load_scene(options.scene, options.settings)
@@ -73,7 +73,6 @@ def _map(options: argparse.Namespace) -> int:
     setup = Setup(outcomes, options.accuracy, options.sampled, options.settled, options.horizons, options.max_events,
                   options.max_work)
     plan = Plan(scene, setup, axes, options.sample, options.seed)
-    check(plan)
     columns = find(outcomes)
     pictures = {column.name: options.output.with_name(f"{options.output.stem}_{column.name}.png") for column in columns}
     for path in pictures.values():

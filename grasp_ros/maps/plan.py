@@ -16,8 +16,7 @@ from grasp_ros.physics.given import number, read_number, text, truth, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.places import parameter_of
-from grasp_ros.simulation.chunk import Setup, checked
-from grasp_ros.simulation.chunk import check as check_setup
+from grasp_ros.simulation.chunk import Setup, check
 from grasp_ros.simulation.variants import Variants
 
 POINTS, MOST, MOST_AXES, DIGITS = 101, 10**9, 2, 15
@@ -74,7 +73,7 @@ def read_axis(option: str, text: str, grid: bool = True) -> Axis:
 
 @dataclass(frozen=True)
 class Plan:
-    """All that the numbers of a map depend on."""
+    """All that the numbers of a map depend on; refused where the scene has not the outcomes, the axes or their ends."""
 
     scene: Scene
     setup: Setup
@@ -83,15 +82,35 @@ class Plan:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Numbers of Python's own, which a file takes."""
+        """Check all, and take numbers of Python's own, which a file takes."""
         axes = tuple(
             Axis(text("axes", name), number(f"{name}: low", low), number(f"{name}: high", high),
                  whole(f"{name}: points", points, 2), truth(f"{name}: log", log))
             for name, low, high, points, log in self.axes)
-        own = {"setup": checked(self.setup), "axes": axes, "sample": whole("sample", self.sample, 0),
+        own = {"setup": check(self.scene, self.setup)[0], "axes": axes, "sample": whole("sample", self.sample, 0),
                "seed": whole("seed", self.seed, 0)}
         for name, value in own.items():
             object.__setattr__(self, name, value)
+        self._check_axes()
+
+    def _check_axes(self) -> None:
+        names = [key for axis in self.axes for key in axis.keys]
+        if not names or len(set(names)) < len(names):
+            raise Refused(f"axes: {', '.join(names) or 'none'}; allowed: one or more numbers of the scene, each once")
+        if not self.sample and len(self.axes) > MOST_AXES:
+            raise Refused(f"axes: {len(self.axes)}; allowed: {MOST_AXES} of a map, any number of a sample")
+        if self.rows > MOST:
+            raise Refused(f"{'sample' if self.sample else 'axes'}: {self.rows:,} runs; allowed: at most {MOST:,}")
+        for axis, key in [(own, key) for own in self.axes for key in own.keys]:
+            if not -math.inf < axis.low < axis.high < math.inf or (axis.log and axis.low <= 0.0):
+                raise Refused(f"{key}: {axis.low!r} to {axis.high!r} is not allowed; allowed: low < high, and > 0 where"
+                              " logarithmic")
+            parameter = parameter_of(self.scene, key)
+            if parameter.whole:
+                raise Refused(f"{self.scene.name}: {key}: takes whole numbers; allowed: real-valued")
+            for end in (axis.low, axis.high):
+                if not parameter.accepts(end):
+                    raise Refused(f"{self.scene.name}: {key}: {end!r} is not allowed; allowed: {parameter.allowed}")
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -137,25 +156,3 @@ class Plan:
         scene = scenes.parse(document["scene"], document["scene_name"], document["scene_name"])
         axes = tuple(Axis(**axis) for axis in document["axes"])
         return Plan(scene, setup, axes, document["sample"], document["seed"])
-
-
-def check(plan: Plan) -> None:
-    """Refuse a setup that the scene has not, axes that it has not, or whose ends it refuses."""
-    check_setup(plan.scene, plan.setup)
-    names = [key for axis in plan.axes for key in axis.keys]
-    if not names or len(set(names)) < len(names):
-        raise Refused(f"axes: {', '.join(names) or 'none'}; allowed: one or more numbers of the scene, each once")
-    if not plan.sample and len(plan.axes) > MOST_AXES:
-        raise Refused(f"axes: {len(plan.axes)}; allowed: {MOST_AXES} of a map, any number of a sample")
-    if plan.rows > MOST:
-        raise Refused(f"{'sample' if plan.sample else 'axes'}: {plan.rows:,} runs; allowed: at most {MOST:,}")
-    for axis, key in [(own, key) for own in plan.axes for key in own.keys]:
-        if not -math.inf < axis.low < axis.high < math.inf or (axis.log and axis.low <= 0.0):
-            raise Refused(f"{key}: {axis.low!r} to {axis.high!r} is not allowed; allowed: low < high, and > 0 where"
-                          " logarithmic")
-        parameter = parameter_of(plan.scene, key)
-        if parameter.whole:
-            raise Refused(f"{plan.scene.name}: {key}: takes whole numbers; allowed: real-valued")
-        for end in (axis.low, axis.high):
-            if not parameter.accepts(end):
-                raise Refused(f"{plan.scene.name}: {key}: {end!r} is not allowed; allowed: {parameter.allowed}")

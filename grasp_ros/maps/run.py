@@ -1,21 +1,36 @@
-"""A map from its plan to its file."""
+"""A map from its plan to its file: rows in threads, or in other processes by Dask.
+
+A cluster is one of this machine, or one that exists. The client hands out chunks and writes what comes back; a chunk
+whose worker dies is computed again by another one, and is written once, because it is written here.
+"""
 
 from __future__ import annotations
 
+import json
+import logging
 import os
+import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Iterable
 from contextlib import closing, nullcontext
+from functools import cache
+from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.maps import cluster
-from grasp_ros.maps.plan import Plan, check
+from grasp_ros.maps.plan import Plan
 from grasp_ros.maps.store import Store
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene.files import needing
+from grasp_ros.scene.versions import versions
 from grasp_ros.simulation.chunk import Chunk, compute
 from grasp_ros.simulation.ensemble import Span, chunk_rows, in_threads
+
+AHEAD = 3  # chunks for each worker that are handed out
+TIMEOUT_S = 10
 
 
 def run(
@@ -31,19 +46,18 @@ def run(
     def work(span: Span, stop: NDArray[np.int64]) -> Chunk:
         return compute(plan.variants(*span), plan.setup, stop)
 
-    check(plan)
     path, told = Path(path), progress or (lambda _: None)
     rows = 1 if path.exists() else chunk_rows(plan.scene, plan.setup, _seconds(plan))
     if path.exists() and not Store(path, plan, rows).spans:  # it is done, and needs no cluster
         told(plan.rows)
         return
     # First, so that a scheduler that does not answer leaves no file behind.
-    with cluster.connect(workers, scheduler) if workers or scheduler else nullcontext() as client:
+    with connect(workers, scheduler) if workers or scheduler else nullcontext() as client:
         store = Store(path, plan, rows)
         spans = store.spans
         done = plan.rows - sum(last - first for first, last in spans)
         told(done)
-        with closing(in_threads(work, spans) if client is None else cluster.on_cluster(client, plan, spans)) as found:
+        with closing(in_threads(work, spans) if client is None else on_cluster(client, plan, spans)) as found:
             for span, chunk in found:
                 store.write(span, chunk)
                 done += span[1] - span[0]
@@ -59,3 +73,60 @@ def _seconds(plan: Plan) -> float:
 
     spent(0)  # it compiles or loads what it takes
     return max(min(spent(row), spent(row)) for row in (0, plan.rows // 2, plan.rows - 1))  # the machine may be busy
+
+
+@cache
+def _known(document: str) -> tuple[dict[str, str], Plan]:
+    return versions(), Plan.from_document(json.loads(document))
+
+
+def work(document: str, span: Span) -> tuple[dict[str, str], Chunk]:
+    """One chunk, and the versions that it was computed with; what a worker does."""
+    found, plan = _known(document)
+    return found, compute(plan.variants(*span), plan.setup)
+
+
+def connect(workers: int, scheduler: str) -> Any:
+    """A client of a new cluster of so many processes on this machine, or of the scheduler at an address."""
+    with needing("a cluster", "cluster"):
+        from distributed import Client
+    if not scheduler:
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])  # a Ctrl-C is for us: workers end with us
+        try:
+            options = {"dashboard_address": None, "silence_logs": logging.CRITICAL}  # workers that end are no error
+            return Client(n_workers=workers, threads_per_worker=1, **options)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    try:
+        return Client(scheduler, timeout=TIMEOUT_S)
+    except (OSError, ValueError) as error:
+        raise Refused(f"scheduler {scheduler}: nobody answers: {error or type(error).__name__}") from None
+
+
+def on_cluster(client: Any, plan: Plan, spans: Iterable[Span]) -> Generator[tuple[Span, Chunk], None, None]:
+    """Do chunks on a cluster, and hand each over when it is done."""
+    from distributed import CancelledError, KilledWorker, as_completed
+
+    document, own = json.dumps(plan.to_document()), versions()
+    following = iter(spans)
+
+    def submit(count: int) -> list[Any]:
+        return [(client.submit(work, document, span, pure=False), span) for span in islice(following, count)]
+
+    threads = max(sum(client.nthreads().values()), 1)
+    waiting: dict[Any, Span] = dict(submit(AHEAD * threads))
+    completed = as_completed(list(waiting))
+    for future in completed:
+        span = waiting.pop(future)
+        try:
+            found, chunk = future.result()
+        except (KilledWorker, CancelledError) as error:
+            reason = " ".join(str(error).split())
+            raise Refused(f"rows {span[0]} to {span[1] - 1}: their workers died: {reason}") from None
+        if found != own:
+            other = ", ".join(f"{name} {version}" for name, version in found.items() if own.get(name) != version)
+            raise Refused(f"a worker has {other}; allowed: the versions of this process, because the bits may differ")
+        for added, following_span in submit(1):
+            waiting[added] = following_span
+            completed.add(added)
+        yield span, chunk

@@ -5,18 +5,17 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.maps.plan import Axis, Plan, check
+from grasp_ros.maps.plan import Axis, Plan
 from grasp_ros.observe.record import Wanted
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import names, read_number
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.simulation.chunk import Setup, checked
+from grasp_ros.simulation.chunk import Setup, check
 from grasp_ros.simulation.ensemble import ensemble
 from grasp_ros.simulation.outcomes import GROUPS, find, wanted_by
 
@@ -40,8 +39,8 @@ class DesignProblem:
     """A scene, its free numbers with their ranges, outcomes to make small, and bounds; what cannot be is refused.
 
     Keys of an axis that are joined have one value; the search takes logarithmic ranges as such. `minimise` names one
-    outcome or two, see `simulation.outcomes`, of a group the largest of its columns. `setup` says how rows are run; its
-    outcomes are those that are needed.
+    outcome or two, see `simulation.outcomes`, of a group the largest of its columns; `units` has their units. `setup`
+    says how rows are run; its outcomes are those that are needed.
     """
 
     def __init__(self, scene: Scene, axes: Sequence[Axis], minimise: Sequence[str], bounds: Sequence[Bound] = (),
@@ -54,23 +53,19 @@ class DesignProblem:
             if not math.isfinite(bound.most):
                 raise Refused(f"{bound.outcome} <= {bound.most!r} is not allowed; allowed: a finite number")
         self.names = tuple(dict.fromkeys([*minimise, *(bound.outcome for bound in bounds)]))
-        for name in self.names:
-            if len({column.unit for column in find([name])}) > 1:
+        self._columns = {name: find([name]) for name in self.names}
+        for name, columns in self._columns.items():
+            if len({column.unit for column in columns}) > 1:
                 raise Refused(f"outcome {name}: has several units; allowed: one of {', '.join(GROUPS[name])}")
-        plan = Plan(scene, checked(setup, self.names), tuple(axes), sample=1)
-        check(plan)
-        self.axes, self.setup = plan.axes, plan.setup
+        self.units = {name: columns[0].unit for name, columns in self._columns.items()}
+        self.setup, _ = check(scene, setup, self.names)
+        self.axes = Plan(scene, self.setup, tuple(axes), sample=1).axes
 
     def why_unsettled(self) -> str:
         """Why no run is known to settle, where that is asked for."""
-        if not wanted_by(column for name in self.names for column in find([name])) & Wanted.SETTLING:
+        if not wanted_by(column for columns in self._columns.values() for column in columns) & Wanted.SETTLING:
             return ""
         return f"; {self.scene.why_unsettled(self.setup.sampled)}; last_outside needs no proof"
-
-    @cached_property
-    def units(self) -> dict[str, str]:
-        """Units of the outcomes."""
-        return {name: find([name])[0].unit for name in self.names}
 
     def numbers(self, parts: Array) -> dict[str, Array]:
         """Free numbers (n,) by their keys, at parts (n, k) of the ranges in [0, 1]."""
@@ -80,8 +75,8 @@ class DesignProblem:
         """Simulate choices, given as free numbers (n,) by their keys."""
         table = ensemble(self.scene, numbers, self.names, setup=self.setup)
         outcomes: dict[str, Array] = {}
-        for name in self.names:
-            worst = np.fmax.reduce([table.columns[column.name] for column in find([name])])  # nan: an absent body
+        for name, columns in self._columns.items():
+            worst = np.fmax.reduce([table.columns[column.name] for column in columns])  # nan: an absent body
             outcomes[name] = np.where(np.isnan(worst), np.inf, worst)  # what no run tells is as bad as can be
         excess: Array = np.zeros(len(table.status))
         for bound in self.bounds:

@@ -35,7 +35,6 @@ SETTLED = 0.02  # of the largest initial displacement
 HORIZONS = 120  # for which a run goes on at most, until V_c decides whether it has settled
 REFUSED = "REFUSED"
 STATUSES = (Status.DONE.name, REFUSED, *(status.name for status in Status if status is not Status.DONE))
-TOUCHES = len((LEFT, RIGHT))
 NO_GRID = np.zeros(0)
 NEVER = np.zeros(1, dtype=np.int64)
 Drive = Callable[[Scene, Integrator, bool, Array], Array]  # see `closed_loop.drive`
@@ -78,37 +77,35 @@ class Chunk(NamedTuple):
     stops: dict[int, str]  # why and where a row was refused or stopped, by its place among these rows
 
 
-def checked(setup: Setup | None, outcomes: Sequence[str] | None = None) -> Setup:
-    """A setup with numbers of Python's own, by default that without arguments; other outcomes take the place of its."""
+def check(scene: Scene, setup: Setup | None, outcomes: Sequence[str] | None = None) -> tuple[Setup, list[Outcome]]:
+    """A setup with numbers of Python's own, and the columns that it asks for; refused if a scene cannot have them.
+
+    None: the setup without arguments. Other outcomes take the place of its.
+    """
+    check_scene(scene)
     setup = Setup() if setup is None else instance("setup", setup, Setup, "a Setup of grasp_ros.simulation")
-    return Setup(
+    setup = Setup(
         names("outcomes", setup.outcomes if outcomes is None else outcomes), check_accuracy(setup.accuracy),
         truth("sampled", setup.sampled), number("settled", setup.settled),
         *(whole(name, getattr(setup, name), 1) for name in ("horizons", "max_events", "max_work")))
-
-
-def check(scene: Scene, setup: Setup) -> list[Outcome]:
-    """The columns that are asked for, if they are to be had and the setting is allowed."""
-    check_scene(scene)
     columns = find(setup.outcomes)
     if not 0.0 < setup.settled < 1.0:
         raise Refused(f"settled: {setup.settled!r} is not allowed; allowed: a number > 0 and < 1")
     if has_inputs(scene, setup) and any(column.name == LYAPUNOV for column in columns):
         raise Refused(f"{scene.name}: outcome lyapunov: allowed: continuous feedback, no external force")
-    return columns
+    return setup, columns
 
 
-def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER, in_one_call: bool = True,
-            move: Drive = drive) -> Chunk:
+def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER, move: Drive = drive) -> Chunk:
     """Run some rows, one after the other; a `stop` that is not 0 ends it early, with rows left out."""
     columns, n = find(setup.outcomes), variants.rows
-    runs = Runs(np.full((n, SEEN), np.nan), np.full((n, 6), np.nan), np.zeros((n, TOUCHES)), np.full(n, np.nan))
+    runs = Runs(np.full((n, SEEN), np.nan), np.full((n, 6), np.nan), np.zeros((n, 2)), np.full(n, np.nan))
     status, stops = np.zeros(n, dtype=np.int8), variants.faults()
     for i in stops:
         status[i] = STATUSES.index(REFUSED)
     left = np.flatnonzero(status == 0)
     plain = COMPILED and variants.is_plain and not has_inputs(variants.scene, setup)  # rows need no interpreter
-    if in_one_call and plain and all(column.name != LYAPUNOV for column in columns):
+    if plain and move is drive and all(column.name != LYAPUNOV for column in columns):
         left = _run_plain(variants, setup, wanted_by(columns), runs, left, stop)
     for i in left.tolist():
         if stop[0]:
@@ -138,7 +135,7 @@ def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, whi
     loop, own, gains, pairs, coulomb, state = map(np.ascontiguousarray, (
         block.closed_loop[which], block.bodies[which], block.laws[which][..., : Column.SET_POINT], block.pairs[which],
         block.coulomb[which, 0, 0], block.state[which, :, 0]))
-    rows = Rows(loop, own, gains, pairs, coulomb, state, np.full((n, SEEN), np.nan), np.zeros((n, TOUCHES)),
+    rows = Rows(loop, own, gains, pairs, coulomb, state, np.full((n, SEEN), np.nan), np.zeros((n, 2)),
                 np.full(n, LEFT_OUT))
     limits = Limits(setup.accuracy, setup.max_events, setup.max_work, stop, setup.settled, setup.horizons)
     integrate_rows(rows, variants.scene.duration, wanted, limits)

@@ -28,14 +28,14 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.files import opened
 from grasp_ros.scene.places import parameter_of
 from grasp_ros.sensitivity.directions import check_keys
-from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, check, checked, compute, has_inputs
+from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, check, compute, has_inputs
 from grasp_ros.simulation.outcomes import BY, CORNER, OUTCOMES, V_C_END, derivatives_by
 from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.tables import frame_of, write_rows
 from grasp_ros.simulation.variants import Variants
 
 CHUNK_S, ROW_S, TICK_S = 0.1, 2e-4, 1e-6  # seconds that a chunk is meant to take, and that its parts take about
-Span = tuple[int, int]
+Span = tuple[int, int]  # first row of a chunk, and the one behind its last
 T = TypeVar("T")
 
 
@@ -147,15 +147,15 @@ def ensemble(
     Refused
         If a key or an outcome is not known, a number has no derivative, or a setting is outside its range.
     """
-    setup = checked(setup, outcomes)
-    columns, variants = check(scene, setup), Variants(scene, changes)
+    (setup, columns), variants = check(scene, setup, outcomes), Variants(scene, changes)
     keys = None if sensitivity is None else names("sensitivity", sensitivity)
     if keys is not None:
         check_keys(scene, keys, setup.sampled)
     wanted = [*(column.name for column in columns), *(derivatives_by(keys) if keys else ())]
     found: dict[str, Array] = {name: np.full(variants.rows, np.nan) for name in wanted}
     status, stops = np.zeros(variants.rows, dtype=np.int8), dict[int, str]()
-    spans = chunks(variants.rows, 1 if keys else chunk_rows(scene, setup))  # derivatives take longer than a run
+    size = 1 if keys else chunk_rows(scene, setup)  # derivatives take longer than a run
+    spans = [(first, min(first + size, variants.rows)) for first in range(0, variants.rows, size)]
 
     def work(span: Span, stop: NDArray[np.int64]) -> Chunk:
         part = variants.part(*span)
@@ -183,11 +183,6 @@ def chunk_rows(scene: Scene, setup: Setup, seconds: float = 0.0) -> int:
     """Rows of one chunk, for about `CHUNK_S` of work; some have taken so many seconds, if that is known."""
     ticks = scene.ticks if has_inputs(scene, setup) else 1
     return max(1, int(CHUNK_S / max(ROW_S + ticks * TICK_S, seconds)))
-
-
-def chunks(rows: int, size: int) -> list[tuple[int, int]]:
-    """First row of each chunk, and the one behind its last."""
-    return [(first, min(first + size, rows)) for first in range(0, rows, size)]
 
 
 def in_threads(work: Callable[[Span, NDArray[np.int64]], T], spans: Iterable[Span], threads: int | None = None

@@ -22,7 +22,7 @@ from grasp_ros.simulation.chunk import HORIZONS, SETTLED, Setup, compute
 from grasp_ros.simulation.closed_loop import drive
 from grasp_ros.simulation.contacts import intervals, side_of
 from grasp_ros.simulation.outcomes import GROUPS
-from grasp_ros.simulation.repeat import UNLIMITED, has_commands, with_commands
+from grasp_ros.simulation.repeat import UNLIMITED, has_ticks, with_commands
 from grasp_ros.simulation.trajectory import Trajectory, check_run
 from grasp_ros.simulation.variants import Variants
 
@@ -58,14 +58,14 @@ def as_row(run: Trajectory, *outcomes: str, horizons: int = HORIZONS) -> dict[st
     that ends elsewhere, and where such commands were not recorded at every control period.
     """
     end = np.array([run.scene.duration])
-    if run.method != EXACT or run.status is not Status.DONE or (run.controllers and not has_commands(run, end)):
+    if run.method != EXACT or run.status is not Status.DONE or (run.controllers and not has_ticks(run, end)):
         return None
     setup = Setup((*outcomes, "last_state"), run.setting, run.sampled, SETTLED, horizons, UNLIMITED, UNLIMITED)
 
     def again(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -> Array:
         return with_commands(run, end, integrator) if run.controllers else drive(scene, integrator, sampled, grid)
 
-    columns = compute(Variants(run.scene, {}), setup, in_one_call=False, move=again).columns
+    columns = compute(Variants(run.scene, {}), setup, move=again).columns
     found = {name: float(own[0]) for name, own in columns.items()}
     last = [found[name] for name in GROUPS["last_state"]]
     if run.sampled and not np.array_equal([[run.scene.duration, *last]], np.c_[run.t, run.state][-1:], equal_nan=True):

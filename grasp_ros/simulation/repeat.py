@@ -47,16 +47,15 @@ def states_at(run: Trajectory, times: Array) -> Array:
     Refused: a time outside the run, commands that were not recorded at every control period, and a run that cannot be
     repeated here to the last bit, as one from another machine.
     """
-    wanted = np.asarray(times, dtype=float)
     end = reached(run)
-    if not ((wanted >= 0.0) & (wanted <= end)).all():
-        odd = wanted[~((wanted >= 0.0) & (wanted <= end))].flat[0]
-        raise Refused(f"time {float(odd)!r} is not allowed; allowed: 0 to {end!r} s")
-    grid, place = np.unique(np.concatenate([wanted.ravel(), run.t]), return_inverse=True)
-    recorded = has_commands(run, grid[-1:])
+    outside = times[~((times >= 0.0) & (times <= end))]
+    if len(outside):
+        raise Refused(f"time {float(outside[0])!r} is not allowed; allowed: 0 to {end!r} s")
+    grid, place = np.unique(np.concatenate([times.ravel(), run.t]), return_inverse=True)
+    recorded = run.sampled and has_ticks(run, grid[-1:])
     states = with_commands(run, grid, integrator_of(run)) if recorded else _solved(run, grid)[0].state
     check_same(run, grid, states)
-    return np.asarray(states[place[: wanted.size]].reshape(*wanted.shape, 6))
+    return np.asarray(states[place[: times.size]].reshape(*times.shape, 6))
 
 
 def check_same(run: Trajectory, grid: Array, states: Array, events: Array | None = None) -> None:
@@ -69,7 +68,7 @@ def check_same(run: Trajectory, grid: Array, states: Array, events: Array | None
 
 def at_every_tick(run: Trajectory) -> Trajectory:
     """A run with every control period among its output times, up to the last of these."""
-    if not len(run.t) or _every_tick(run, run.t[-1:]):
+    if not len(run.t) or has_ticks(run, run.t[-1:]):
         return run
     ticks = tick_times(run.scene)
     grid = np.union1d(ticks[ticks <= run.t[-1]], run.t)
@@ -100,12 +99,7 @@ def _solved(run: Trajectory, grid: Array) -> tuple[Solution, LoopRecord | None]:
     return solve(run.scene, grid, run.method, run.setting, run.sampled, UNLIMITED, most)
 
 
-def has_commands(run: Trajectory, last: Array) -> bool:
-    """Whether the command at every control period up to the last of some times was recorded."""
-    return run.sampled and _every_tick(run, last)
-
-
-def _every_tick(run: Trajectory, last: Array) -> bool:
+def has_ticks(run: Trajectory, last: Array) -> bool:
     """Whether the output times hold every control period up to the last of some times."""
     ticks = tick_times(run.scene)[: int(tick_of(run.scene, last).max(initial=0)) + 1]
     return bool(np.isin(ticks, run.t).all())
