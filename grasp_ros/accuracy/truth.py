@@ -16,13 +16,12 @@ from grasp_ros.physics.accuracy import FINEST
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import EPS, LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
+from grasp_ros.scene.effects.force import SECTIONS
 from grasp_ros.simulation.simulate import GRID_POINTS, simulate
 from grasp_ros.simulation.trajectory import Trajectory
 
 FINER = 10.0
-SECTIONS = {name: name if name == "object" else f"{name}_arm" for name in NAMES.values()}
 
 
 class Truth(NamedTuple):
@@ -41,16 +40,12 @@ def finest(scene: Scene) -> Truth:
     if run.status is not Status.DONE:
         raise Refused(f"{scene.name}: {run.stop}; allowed here: a scene that runs to its end")
     rounding = EPS * float(np.nanmax(np.abs(run.state[:, 0::2])))
-    apart = [distance(run, simulate(scene, grid=grid, setting=FINER * FINEST).state) / FINER, *(
-        distance(run, simulate(_beside(scene, section, rounding), grid=grid, setting=FINEST).state)
-        for section in SECTIONS.values() if section in scene.values)]
+    apart = [distance(run, simulate(scene, grid=grid, setting=FINER * FINEST).state) / FINER]
+    for body in {*SECTIONS} & {*scene.values}:
+        beside = scene.changed({f"{body}.position_m": scene.values[body]["position_m"] + rounding})  # farther right
+        apart.append(distance(run, simulate(beside, grid=grid, setting=FINEST).state))
     left, right = (len(run.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))
     return Truth(grid, run.state, (left, right), max(apart))
-
-
-def _beside(scene: Scene, section: str, rounding: float) -> Scene:
-    """A scene whose body begins a rounding in m farther right."""
-    return scene.changed({f"{section}.position_m": float(scene.values[section]["position_m"] + rounding)})
 
 
 def distance(truth: Truth | Trajectory, state: Array) -> float:

@@ -15,8 +15,7 @@ from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
-from grasp_ros.accuracy.contender import Contender
-from grasp_ros.accuracy.measure import Record
+from grasp_ros.accuracy.measure import Contender, Record
 from grasp_ros.scene import Scene
 from lab.studies import measure
 from lab.studies.measure import Effort

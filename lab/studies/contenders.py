@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 
-from grasp_ros.accuracy.contender import DONE, Answer, Contender, Solve, own_contenders
+from grasp_ros.accuracy.measure import DONE, Answer, Contender, Solve, own_contenders
 from grasp_ros.methods.equations import parameters
 from grasp_ros.methods.library import slopes
 from grasp_ros.methods.registry import METHODS

@@ -12,7 +12,7 @@ import numpy as np
 from tqdm import tqdm
 
 from grasp_ros import scene as scenes
-from grasp_ros.accuracy.contender import Contender
+from grasp_ros.accuracy.measure import Contender
 from grasp_ros.physics.energy import energy
 from grasp_ros.scene import Scene
 from lab.reference.deadline import Deadline, deadline

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from grasp_ros.accuracy.contender import Answer, Contender
+from grasp_ros.accuracy.measure import Answer, Contender
 from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.physics.layout import LEFT, RIGHT, X
 from grasp_ros.physics.model import Array

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from grasp_ros.accuracy.contender import Answer, Contender, Solve
+from grasp_ros.accuracy.measure import Answer, Contender, Solve
 from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.methods.equations import CONTACT, condition, parameters, rates
 from grasp_ros.physics.layout import LEFT, RIGHT

@@ -13,8 +13,7 @@ import pytest
 from documents import horizon, stalling
 
 from grasp_ros import scene as scenes
-from grasp_ros.accuracy.contender import Answer, Contender, contender_of
-from grasp_ros.accuracy.measure import Record
+from grasp_ros.accuracy.measure import Answer, Contender, Record, contender_of
 from grasp_ros.accuracy.truth import Truth, finest
 from lab.studies import accuracy, figures, measure
 from lab.studies.records import Journal, write_csv

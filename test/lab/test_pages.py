@@ -20,7 +20,7 @@ import pytest
 from jinja2 import Environment, nodes
 
 from grasp_ros import scene as scenes
-from grasp_ros.accuracy.contender import contender_of
+from grasp_ros.accuracy.measure import contender_of
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.simulation import GRID_POINTS
 from lab.cases.registry import cases
