@@ -104,10 +104,9 @@ class ControlLaw:
     `row` holds all of its numbers, see `Column`; `seed`, (seed, side), is that of its noise; None: no noise.
     """
 
-    def __init__(self, position_gain: float, velocity_gain: float, set_point: float = 0.0, feed_forward: float = 0.0
-                 ) -> None:
+    def __init__(self, position_gain: float = 0.0, velocity_gain: float = 0.0) -> None:
         self.row: Array = np.zeros(len(Column))
-        self.row[:4] = position_gain, velocity_gain, set_point, feed_forward
+        self.row[: Column.SET_POINT] = position_gain, velocity_gain
         self.row[Column.LIMIT] = np.inf
         self.seed: tuple[int, int] | None = None
 

@@ -6,7 +6,6 @@ stiffness of contact, no controller and no force here, and is not simulated.
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -29,22 +28,8 @@ class ExternalForce(NamedTuple):
     """A force on one body, constant over each control period."""
 
     body: int
-    at: Callable[[int], float]  # tick to N
+    at: Callable[[NDArray[np.int64]], Array]  # ticks (n,) to N (n,), from each of them to the next
     changes: Callable[[int], Sequence[int]]  # ascending ticks of the run, in (0, n), at which it may change, from n
-
-    def over(self, ticks: NDArray[np.int64]) -> Array:
-        """Values (n,) in N from each of the ascending ticks (n,) on, computed only where it may change.
-
-        If there are more changes than ticks, it is computed at the ticks.
-        """
-        if not len(ticks):
-            return np.zeros(0)
-        first, last = int(ticks[0]), int(ticks[-1])
-        changes = self.changes(last + 1)
-        changes = changes[bisect_right(changes, first) : bisect_right(changes, last)]
-        at = [first, *changes] if len(changes) < len(ticks) else ticks.tolist()
-        values = np.array([self.at(tick) for tick in at])
-        return values[np.searchsorted(at, ticks, side="right") - 1]
 
 
 @dataclass
@@ -68,7 +53,7 @@ class System:
         if array == "coulomb":
             self.coulomb = number
         elif array == "laws":
-            self.laws.setdefault(row, ControlLaw(0.0, 0.0)).row[column] = number
+            self.laws.setdefault(row, ControlLaw()).row[column] = number
         else:
             rows = getattr(self, array)
             rows.reshape(len(rows), -1)[row, column] = number
@@ -115,16 +100,13 @@ class System:
 
     def external_at(self, tick: int) -> Array:
         """External forces (3,) in N from a tick to the next, by body."""
-        forces = np.zeros(3)
-        for force in self.external:
-            forces[force.body] += force.at(tick)
-        return forces
+        return np.asarray(self.external_over(np.array([tick]))[0])
 
     def external_over(self, ticks: NDArray[np.int64]) -> Array:
-        """External forces (n, 3) in N, by body, from each of the ascending ticks (n,) to the next."""
+        """External forces (n, 3) in N, by body, from each of the ticks (n,) to the next."""
         forces = np.zeros((len(ticks), 3))
         for force in self.external:
-            forces[:, force.body] += force.over(ticks)
+            forces[:, force.body] += force.at(ticks)
         return forces
 
     def impact(self, side: int, state: Sequence[float]) -> float:

@@ -86,7 +86,7 @@ def drive_sampled(
         if plant.tick in changes:
             scene = scene.changed(changes[plant.tick])
         # a user's controller has the sensor and the actuator of the scene
-        laws = {**{side: ControlLaw(0.0, 0.0) for side in by_user}, **scene.system.laws}
+        laws = {**{side: ControlLaw() for side in by_user}, **scene.system.laws}
         outputs, interval = outputs_within(grid, ticks, scene.period_ns)
         record = plant.run(laws, outputs, by_user, states[done : done + len(interval)])
         at_end = len(ticks) == 1  # the output times of the last tick and later: nothing acts there

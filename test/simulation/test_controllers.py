@@ -60,7 +60,7 @@ def test_the_compiled_law_has_the_bits_of_the_one_that_a_node_runs() -> None:
     """Over many sizes, with zeros of both signs and without any limit, noise or step."""
     draw = np.random.default_rng(5)
     for _ in range(3000):
-        row = ControlLaw(0.0, 0.0).row
+        row = ControlLaw().row
         for columns in ([0, 1, 2, 3], [4, 5], [6, 7], [8]):
             chosen = [column for column in columns if draw.random() < 0.6]
             row[chosen] = 10.0 ** draw.uniform(-9.0, 3.0, len(chosen))

@@ -6,10 +6,12 @@ Because a force changes at ticks only, the motion between them stays exact, and 
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Iterable
 from functools import partial
 from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
 
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
@@ -48,15 +50,13 @@ def _build_steps(section: str, body: int, sections: Sections, system: System) ->
     """A force from each tick to the next: those of a table, or of a pulse, which is one of two entries."""
     numbers, period = sections[section], period_ns(sections)
     if "time_s" in numbers:
-        ticks, forces = [nanoseconds(time) // period for time in numbers["time_s"]], (0.0, *numbers["force_N"])
+        starts, forces = [nanoseconds(time) // period for time in numbers["time_s"]], (0.0, *numbers["force_N"])
     else:
         begin = nanoseconds(numbers["start_s"]) // period
-        ticks, forces = [begin, begin + nanoseconds(numbers["length_s"]) // period], (0.0, numbers["force_N"], 0.0)
-
-    def at(tick: int) -> float:
-        return float(forces[bisect_right(ticks, tick)])
-
-    _add(section, ExternalForce(body, at, lambda end: [tick for tick in ticks if 0 < tick < end]), system)
+        starts, forces = [begin, begin + nanoseconds(numbers["length_s"]) // period], (0.0, numbers["force_N"], 0.0)
+    begins, values = np.array(starts), np.array(forces, dtype=float)
+    _add(section, ExternalForce(body, lambda ticks: values[np.searchsorted(begins, ticks, side="right")],
+                                lambda end: [tick for tick in starts if 0 < tick < end]), system)
 
 
 def _build_sine(section: str, body: int, sections: Sections, system: System) -> None:
@@ -65,8 +65,8 @@ def _build_sine(section: str, body: int, sections: Sections, system: System) -> 
     turn = 2.0 * math.pi * numbers["frequency_Hz"] * period_ns(sections) / NANOSECONDS
     phase = numbers.get("phase_rad", 0.0)
 
-    def at(tick: int) -> float:
-        return float(numbers["amplitude_N"] * math.sin(turn * (tick + 0.5) + phase))
+    def at(ticks: NDArray[np.int64]) -> Array:
+        return np.array([numbers["amplitude_N"] * math.sin(turn * (tick + 0.5) + phase) for tick in ticks.tolist()])
 
     _add(section, ExternalForce(body, at, lambda end: range(1, end)), system)
 
