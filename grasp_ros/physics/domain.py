@@ -65,7 +65,7 @@ class Systems:
     """
 
     def __init__(self, bodies: Array, pairs: Array, state: Array, duration: float) -> None:
-        self._bodies, self._pairs, self._duration = bodies, pairs, duration
+        self._bodies, self._pairs, self.duration = bodies, pairs, duration
         self.there = bodies[..., Of.MASS] > 0.0
         self.mass = np.where(self.there, bodies[..., Of.MASS], 1.0)
         by_body = [0, 2, 1]  # of the columns of a state
@@ -82,7 +82,7 @@ class Systems:
         """What each body reaches by its own spring and constant force, (n, 3) in m/s."""
         force = self._bodies[..., Of.FORCE] - self._bodies[..., Of.STIFFNESS] * self.x
         rate = np.maximum(self.swing, self._bodies[..., Of.DAMPING] / self.mass)
-        return np.abs(self.v) + np.abs(force) / self.mass / np.maximum(rate, 1.0 / self._duration)
+        return np.abs(self.v) + np.abs(force) / self.mass / np.maximum(rate, 1.0 / self.duration)
 
     @cached_property
     def reduced(self) -> Array:
@@ -120,18 +120,6 @@ class Systems:
         closed = self.touching & (self.gap == 0.0)
         return np.asarray(np.abs(self.v[:, :OBJECT] - self.v[:, OBJECT:]) / _rounding(self.v) * closed)
 
-    def masses(self) -> Array:
-        """Mass of an arm by that of the object that it hits, (n, 2)."""
-        return self.mass[:, :OBJECT] / self.mass[:, OBJECT:] * self.touching
-
-    def turns(self) -> Array:
-        """sqrt(k/m) times the duration, (n, 3)."""
-        return self.swing * self._duration * self.there
-
-    def speeds(self) -> Array:
-        """What each body reaches by itself, (n, 3) in m/s."""
-        return self.speed * self.there
-
     def thrown(self) -> Array:
         """Speed at which a pair that starts pressed in is pushed apart, (n, 2) in m/s."""
         stored = stored_energy(self._pairs[..., Law.HERTZIAN], np.maximum(-self.gap, 0.0)) * self.touching
@@ -144,8 +132,8 @@ class Systems:
         presses for a time t, and p v for an impact at v that loses all of v.
         """
         loss = self._pairs[..., Law.DISSIPATION]
-        outward = np.minimum(self._duration, 0.4 * loss * np.maximum(-self.gap, 0.0))  # s, separating at 1/p
-        force = self.elastic * outward + self.pressed * self._duration
+        outward = np.minimum(self.duration, 0.4 * loss * np.maximum(-self.gap, 0.0))  # s, separating at 1/p
+        force = self.elastic * outward + self.pressed * self.duration
         return loss * self.touching * (self.speed[:, :OBJECT] + self.speed[:, OBJECT:] + force / self.reduced)
 
 
@@ -186,12 +174,13 @@ RULES = (
          _arms("arm.velocity_m_per_s"), Systems.closing),
     Rule("mass of the arm / mass of the object", 1e-12, 1e12, "",
          "four digits are left of the velocity that an impact gives the heavier body", _arms("arm.mass_kg"),
-         Systems.masses),
+         lambda rows: rows.mass[:, :OBJECT] / rows.mass[:, OBJECT:] * rows.touching),
     Rule("sqrt(k/m) of a body x duration", 0.0, 1e12, "",
-         "one rounding of sqrt(k/m) shifts the phase at the end by 1e-4", ("time.duration_s",) * 3, Systems.turns),
+         "one rounding of sqrt(k/m) shifts the phase at the end by 1e-4", ("time.duration_s",) * 3,
+         lambda rows: rows.swing * rows.duration * rows.there),
     Rule("speed that a body reaches by its start, spring and constant force", 0.0, 1e10, "m/s",
          "a hundredth of what a run may reach", ("left_arm.mass_kg", "right_arm.mass_kg", "object.mass_kg"),
-         Systems.speeds),
+         lambda rows: rows.speed * rows.there),
     Rule("speed at which a pair that starts pressed in separates", 0.0, 1e10, "m/s",
          "a hundredth of what a run may reach", _arms("arm.position_m"), Systems.thrown),
     Rule("p J / mu of a pair, with J its impulse and mu its reduced mass", 0.0, 1e8, "",
@@ -200,23 +189,15 @@ RULES = (
 )
 
 
-class Outside(NamedTuple):
-    """A number that puts a scene outside."""
-
-    rule: Rule
-    key: str
-    measured: float
-
-
-def outside(system: System, duration: float) -> Outside | None:
-    """The first rule that a system breaks over a duration in s, or None."""
+def outside(system: System, duration: float) -> tuple[Rule, str, float] | None:
+    """The first rule that a system breaks over a duration in s, the key, and what was measured; or None."""
     rows = Systems(system.closed_loop[None], system.pairs[None], system.state[None], duration)
     for rule in RULES:
         measured = rule.measure(rows)
         wrong = _breaks(rule, measured)[0]
         if wrong.any():
             column = int(wrong.argmax())
-            return Outside(rule, rule.keys[column], float(measured[0, column]))
+            return rule, rule.keys[column], float(measured[0, column])
     return None
 
 

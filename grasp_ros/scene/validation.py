@@ -92,6 +92,7 @@ def check_domain(source: str, values: Mapping[str, Mapping[str, Any]], system: S
     """Refuse a scene outside the domain, see `physics.domain`."""
     found = outside(system, values["time"]["duration_s"])
     if found is not None:
-        section, _, key = found.key.partition(".")
-        raise SceneError(f"{source}: {found.key}: {values[section][key]!r} is not allowed: {found.rule.text} is"
-                         f" {found.measured:.6g}; allowed: {found.rule.allowed}")
+        rule, name, measured = found
+        section, _, key = name.partition(".")
+        raise SceneError(f"{source}: {name}: {values[section][key]!r} is not allowed: {rule.text} is {measured:.6g};"
+                         f" allowed: {rule.allowed}")
