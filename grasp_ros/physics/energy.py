@@ -58,7 +58,12 @@ def energy(system: System, state: Array, external: Array | None = None, *, feedb
     external = None if external is None else given.rows("external", external, 3)
     given.check_rows(state=state, external=external)
     bodies = given.instance("system", system, System, "a System").closed_loop if feedback else system.bodies
-    V = V_c = _mechanical(system, bodies, state)
+    kinetic: Array = np.zeros(np.shape(state)[:-1])
+    potential: Array = np.zeros(np.shape(state)[:-1])
+    for body in system.present:
+        moving, held = mechanical_levels(bodies, body, state)
+        kinetic, potential = kinetic + moving, potential + held
+    V = V_c = kinetic + potential
     V_rate = _power(system, bodies, state, external)
     mode = np.zeros(np.shape(V), dtype=np.int64)
     for side, u, d in pairs_of(system, state):
@@ -106,7 +111,13 @@ def energy_balance(system: System, before: Array, after: Array, forces: Array) -
     given.instance("system", system, System, "a System")
     rounding: Array = np.zeros(np.shape(before)[:-1])
     for state in (before, after):
-        level, size = _own_energy(system, state)
+        level: Array = np.zeros(np.shape(state)[:-1])
+        size: Array = np.zeros(np.shape(state)[:-1])
+        for body in system.present:
+            x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
+            mass, stiffness, _, force = system.bodies[body]
+            own, own_size = body_energy(mass, stiffness, force, x, v, _place(system, body, state))
+            level, size = level + own, size + own_size
         for side, u, _ in pairs_of(system, state):
             force = hertzian_force(Contact(*system.pairs[side]), u)
             level = level + elastic_level(system, side, u)
@@ -130,28 +141,6 @@ def mechanical_levels(bodies: Array, body: int, state: Array) -> tuple[Array, Ar
     elif force != 0.0:
         potential = -2.0 * force * x
     return bodies[body, Of.MASS] * v * v, potential
-
-
-def _mechanical(system: System, bodies: Array, state: Array) -> Array:
-    """Kinetic energy and potential of the linear terms, twice."""
-    kinetic: Array = np.zeros(np.shape(state)[:-1])
-    potential: Array = np.zeros(np.shape(state)[:-1])
-    for body in system.present:
-        moving, held = mechanical_levels(bodies, body, state)
-        kinetic, potential = kinetic + moving, potential + held
-    return kinetic + potential
-
-
-def _own_energy(system: System, state: Array) -> tuple[Array, Array]:
-    """Twice the energy of the bodies by themselves, and the sum of the sizes of its terms."""
-    total: Array = np.zeros(np.shape(state)[:-1])
-    size: Array = np.zeros(np.shape(state)[:-1])
-    for body in system.present:
-        x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
-        mass, stiffness, _, force = system.bodies[body]
-        own, own_size = body_energy(mass, stiffness, force, x, v, _place(system, body, state))
-        total, size = total + own, size + own_size
-    return total, size
 
 
 def elastic_level(system: System, side: int, u: Array) -> Array:

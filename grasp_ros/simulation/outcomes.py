@@ -85,14 +85,13 @@ _GROUPS: dict[str, tuple[Outcome, ...]] = {
         for side, name in enumerate(SIDES)),
     "peak_input": tuple(
         Outcome(f"peak_input_{name}", "N", f"largest input of the {name} arm: command and external force",
-                Wanted.INPUTS, _largest(q))
-        for q, name in zip((Quantity.INPUT_L, Quantity.INPUT_R), SIDES, strict=True)),
+                Wanted.INPUTS, _largest(Quantity.INPUT_L + side)) for side, name in enumerate(SIDES)),
     "peak_impact": tuple(
-        Outcome(f"peak_impact_{name}", "N", f"largest impact force of the {name} arm", Wanted.IMPACTS, _peak(q))
-        for q, name in zip((Quantity.IMPACT_L, Quantity.IMPACT_R), SIDES, strict=True)),
+        Outcome(f"peak_impact_{name}", "N", f"largest impact force of the {name} arm", Wanted.IMPACTS,
+                _peak(Quantity.IMPACT_L + side)) for side, name in enumerate(SIDES)),
     "peak_penetration": tuple(
-        Outcome(f"peak_penetration_{name}", "m", f"largest penetration of the {name} arm", Wanted.IMPACTS, _peak(q))
-        for q, name in zip((U.L, U.R), SIDES, strict=True)),
+        Outcome(f"peak_penetration_{name}", "m", f"largest penetration of the {name} arm", Wanted.IMPACTS,
+                _peak(U.L + side)) for side, name in enumerate(SIDES)),
     "energy": tuple(
         Outcome(name, "J", text, Wanted.LOSSES, _column("seen", place)) for name, text, place in (
             ("lost_dampers", "energy that the dampers of the arms took", Seen.DAMPERS),

@@ -34,7 +34,7 @@ def as_function(section: Function | ArrayLike, level: float) -> Function:
     if not np.isfinite(level):
         raise Refused(f"level: {level!r} is not allowed; allowed: a finite number")
     if callable(section):
-        return lambda t, state: _real(section(t, state)) - level
+        return lambda t, state: _checked(section(t, state), t) - level
     try:
         weights = column("function", section)
     except Refused:
@@ -43,7 +43,7 @@ def as_function(section: Function | ArrayLike, level: float) -> Function:
         raise Refused(f"section: {section!r} is not allowed; allowed: six weights of the state, not all 0, or a"
                       " callable of times (n,) and states (n, 6)")
     used = np.flatnonzero(weights)
-    return lambda _, state: np.asarray(state[:, used] @ weights[used]) - level
+    return lambda t, state: _checked(state[:, used] @ weights[used], t) - level
 
 
 def crossings(function: Function, direction: int, breaks: Array, states: States) -> Section:
@@ -55,14 +55,14 @@ def crossings(function: Function, direction: int, breaks: Array, states: States)
         raise Refused(f"direction: {direction!r} is not allowed; allowed: -1, 0 or 1")
 
     def quantity(t: Array, state: Array) -> tuple[Array, Array]:
-        values = _checked(function, t, state)[:, None]
+        values = function(t, state)[:, None]
         return values, np.zeros_like(values)
 
     pieces = expand(states, quantity, breaks[:-1], breaks[1:], np.zeros(len(breaks) - 1, dtype=np.int64))
     t, reach = _candidates(pieces)
     ends = np.concatenate([breaks[:1], t, breaks[-1:]])
     middles = 0.5 * (ends[1:] + ends[:-1])
-    values = _checked(function, middles, states(middles))
+    values = function(middles, states(middles))
     signs = _carried(np.sign(values))
     turn = np.where(signs[:-1] != 0, np.sign(np.diff(signs)), 0)
     kept = (turn != 0) & ((turn == direction) | (direction == 0))
@@ -74,18 +74,14 @@ def crossings(function: Function, direction: int, breaks: Array, states: States)
     return Section(t, states(t), turn[kept], float(lost.max(initial=0.0)))
 
 
-def _checked(function: Function, t: Array, state: Array) -> Array:
-    values = np.asarray(function(t, state))
-    if values.shape != t.shape or not np.isfinite(values).all():
-        raise Refused(f"section: gives numbers of shape {values.shape} for times of shape {t.shape}, or some that are"
-                      " not finite; allowed: a finite number for each")
-    return values
-
-
-def _real(values: ArrayLike) -> Array:
+def _checked(values: ArrayLike, t: Array) -> Array:
     if np.iscomplexobj(values):  # numpy would drop the imaginary parts
         raise Refused("section: gives complex numbers; allowed: a finite number for each")
-    return np.asarray(values, dtype=float)
+    found = np.asarray(values, dtype=float)
+    if found.shape != t.shape or not np.isfinite(found).all():
+        raise Refused(f"section: gives numbers of shape {found.shape} for times of shape {t.shape}, or some that are"
+                      " not finite; allowed: a finite number for each")
+    return found
 
 
 def _carried(signs: Array) -> NDArray[np.int64]:

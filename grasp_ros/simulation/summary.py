@@ -63,7 +63,10 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
     """Energies, settling times, largest forces and losses, as far as the scene has them."""
     scene, distance, settles = run.scene, settled_distance(run.scene), may_settle(run)
     row = as_row(run, *PEAKS, "energy", "settling_times" if settles else "last_outside_times")
-    dense = _dense(run) if row is None or needs_ticks(run) else None
+    dense = None
+    if (row is None or needs_ticks(run)) and scene.ticks <= max(MOST_TICKS, len(run.t)):
+        with suppress(Refused):  # a run that cannot be repeated
+            dense = at_every_tick(run)
     known = run if dense is None else dense
     ends, at = known.state[[0, -1]], known.t[[0, -1]].tolist()
     if row is not None:
@@ -91,14 +94,6 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
         if scene.system.external:
             found["work_external_J"] = external_work(known, row)
     return found
-
-
-def _dense(run: Trajectory) -> Trajectory | None:
-    """The run with every control period among its output times; None if it cannot be repeated, or is too long."""
-    with suppress(Refused):
-        if run.scene.ticks <= max(MOST_TICKS, len(run.t)):
-            return at_every_tick(run)
-    return None
 
 
 def _by_body(run: Trajectory, times: Array) -> dict[str, float]:
