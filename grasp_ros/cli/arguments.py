@@ -39,12 +39,11 @@ def add_scene(sub: argparse.ArgumentParser) -> None:
 
 def complete_scenes(argument: argparse.Action) -> None:
     """Let a shell complete the names of scenes, and files, in place of an argument."""
-    argument.completer = _scenes_and_files  # type: ignore[attr-defined]
+    def completer(prefix: str, **_: object) -> list[str]:
+        paths = Path().glob(f"{glob.escape(prefix)}*")
+        return [*scenes.names(), *(str(path) for path in paths if path.is_dir() or path.suffix == ".yaml")]
 
-
-def _scenes_and_files(prefix: str, **_: object) -> list[str]:
-    files = [str(path) for path in Path().glob(f"{glob.escape(prefix)}*") if path.is_dir() or path.suffix == ".yaml"]
-    return [*scenes.names(), *files]
+    argument.completer = completer  # type: ignore[attr-defined]
 
 
 def add_settings(sub: argparse.ArgumentParser) -> None:

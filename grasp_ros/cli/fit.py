@@ -46,10 +46,14 @@ def _fit(options: argparse.Namespace) -> int:
         scene = scenes.parse(own.to_yaml(), own.name, own.name, options.settings)
         warn(scene)
     against: dict[str, float] = {}
-    for key, value in map(_value, options.against):
+    for text in options.against:
+        key, _, word = text.partition("=")
         if key in against:
             raise Refused(f"--against {key}: given twice; allowed: one value")
-        against[key] = value
+        try:
+            against[key] = read_number(word)
+        except ValueError:
+            raise Refused(f"--against {text}: allowed: KEY=VALUE, with a number") from None
     prepare()
     found = fit(options.source, options.free, scene, against=against, by_sensors=options.by_sensors)
     show(options, printable(str(found)), _data(found))
@@ -60,14 +64,6 @@ def _fit(options: argparse.Namespace) -> int:
 
         write_figure(measured_and_fitted(found), options.output)
     return 1 if found.not_identifiable else 0
-
-
-def _value(text: str) -> tuple[str, float]:
-    key, _, word = text.partition("=")
-    try:
-        return key, read_number(word)
-    except ValueError:
-        raise Refused(f"--against {text}: allowed: KEY=VALUE, with a number") from None
 
 
 def _data(found: Fit) -> dict[str, Any]:

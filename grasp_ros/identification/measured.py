@@ -67,24 +67,26 @@ def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> M
     By sensors: what those of the scene have measured, in place of the exact states of a bag. A source that cannot be
     read, holds too little, or holds what is no number, is refused.
     """
+    name = "run"
     if not isinstance(source, (Recording, Trajectory)):
         path = Path(given.instance("data", source, (str, os.PathLike), "a path, a Recording or a Trajectory"))
         with reading(path):
             directory = S_ISDIR(path.stat().st_mode)
-        source = read(path) if directory or path.suffix.lower() == ".mcap" else path
+        name = str(path)
+        if directory or path.suffix.lower() == ".mcap":
+            source = read(path)
+        elif path.suffix.lower() != ".csv":
+            source = load(path)
     if by_sensors and not isinstance(source, Recording):
         raise Refused("measured by sensors: allowed: of a bag")
     if isinstance(source, Recording):
         found = _of_recording(source, by_sensors)
     elif isinstance(source, Trajectory):
-        found = _of_trajectory(source, "run")
-    elif Path(source).suffix.lower() == ".csv":
-        if scene is None:
-            raise Refused(f"{source}: a table does not name its scene; allowed: with a scene given")
-        return _checked(_of_table(Path(source), scene))
+        found = _of_trajectory(source, name)
+    elif scene is None:
+        raise Refused(f"{name}: a table does not name its scene; allowed: with a scene given")
     else:
-        path = Path(source)
-        found = _of_trajectory(load(path), str(path))
+        return _checked(_of_table(path, scene))
     if scene is None:
         return _checked(found)
     if found.inputs is not None and scene.period_ns != found.scene.period_ns:

@@ -74,7 +74,7 @@ def numbers_of(scene: Scene, keys: Sequence[str], data: Measured) -> tuple[Numbe
 
 
 def acts(key: str) -> bool:
-    """Whether a number decides what acts on the bodies from outside: one of a controller, or an external force."""
+    """Whether a number, or a section, decides what acts from outside: that of a controller, or an external force."""
     section = key.partition(".")[0]
     return section in FORCED or (section in BY_SECTION and BY_SECTION[section].node != "plant")
 

@@ -18,13 +18,11 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.identification.measured import FEWEST, Measured
-from grasp_ros.identification.numbers import Number
+from grasp_ros.identification.numbers import Number, acts
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import Entry, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene, compose
-from grasp_ros.scene.effects import BY_SECTION
-from grasp_ros.scene.effects.force import FORCED
 from grasp_ros.sensitivity.directions import directions
 from grasp_ros.simulation.differentiate import carry, complete
 from grasp_ros.simulation.sampled_plant import SampledPlant
@@ -99,9 +97,9 @@ def search(problem: FitProblem) -> Array:
     problem.residuals(begin, FEWEST)  # a start that is refused says why
     best, least = begin, math.inf
     for growth in GROWTHS:
-        y = begin
-        for rows in _horizons(len(problem.data.t), growth):
-            before, y = y, refine(problem, y, rows, ROUGH)
+        y, rows = begin, len(problem.data.t)
+        for step in range(math.ceil(math.log(FIRST, growth) - 1e-9), -1, -1):
+            before, y = y, refine(problem, y, max(round(rows * growth**-step), min(FEWEST, rows)), ROUGH)
             if y is before:  # nor does it get farther
                 break
         size = mean_square(problem, y)
@@ -114,11 +112,6 @@ def search(problem: FitProblem) -> Array:
         raise Refused(f"{problem.data.name}: {start}: with these starts no run of {problem.scene.name} reaches its end;"
                       " allowed: others")
     return best
-
-
-def _horizons(rows: int, growth: float) -> list[int]:
-    steps = math.ceil(math.log(FIRST, growth) - 1e-9)
-    return [max(round(rows * growth**-step), min(FEWEST, rows)) for step in range(steps, -1, -1)]
 
 
 def mean_square(problem: FitProblem, y: Array) -> float:
@@ -218,6 +211,5 @@ def _until(scene: Scene, times: Array) -> Scene:
 def _plant(scene: Scene) -> Scene:
     """What is left of a scene where all that acts from outside is known: bodies and contacts."""
     return compose(scene.name, {
-        section: numbers for section, numbers in scene.values.items()
-        if BY_SECTION[section].node == "plant" and section != "loop" and section not in FORCED
+        section: numbers for section, numbers in scene.values.items() if not acts(section) and section != "loop"
     })

@@ -7,7 +7,7 @@ each generation is one ensemble.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -106,11 +106,14 @@ def search(problem: DesignProblem, seed: int = 0, progress: Told | None = None) 
     runs, seed, worst = 0, whole("seed", seed, 0), -np.inf
 
     def function(parts: Array) -> Array:
+        """The outcome; above all outcomes what breaks a bound, the less the better."""
         nonlocal runs, worst
         runs += parts.shape[1]
         if progress is not None:
             progress(runs)
-        reached = costs(problem, np.ascontiguousarray(parts.T))
+        tried = problem.found(problem.numbers(np.ascontiguousarray(parts.T)))
+        outcome = np.minimum(tried.outcomes[problem.minimise[0]], NOTHING)
+        reached = np.where(tried.excess > 0.0, np.minimum(BROKEN * (1.0 + tried.excess), NOTHING), outcome)
         worst = max(worst, float(reached.max()))
         return reached
 
@@ -154,13 +157,6 @@ def _with_ends(place: Array) -> Array:
     return np.unique(np.vstack([place, ends, single]), axis=0)
 
 
-def costs(problem: DesignProblem, parts: Array) -> Array:
-    """What a search makes small: the outcome; above all outcomes what breaks a bound, the less the better."""
-    found = problem.found(problem.numbers(parts))
-    outcome = np.minimum(found.outcomes[problem.minimise[0]], NOTHING)
-    return np.where(found.excess > 0.0, np.minimum(BROKEN * (1.0 + found.excess), NOTHING), outcome)
-
-
 def front(problem: DesignProblem, seed: int = 0, progress: Told | None = None) -> list[Design]:
     """The Pareto front of the two outcomes of a problem, from the first outcome's best on.
 
@@ -182,12 +178,7 @@ def front(problem: DesignProblem, seed: int = 0, progress: Told | None = None) -
     most, least = add(first, problem.bounds).outcomes[second], add(second, problem.bounds).outcomes[second]
     for level in np.linspace(most, least, FRONT)[1:]:
         add(first, (*problem.bounds, Bound(second, max(float(level), least))))
-    return _undominated(choices, first, second)
-
-
-def _undominated(choices: Iterable[Design], first: str, second: str) -> list[Design]:
-    """Those than which no other one is better in one outcome and as good in the other, by their first outcome."""
-    best: list[Design] = []
+    best: list[Design] = []  # than which no other one is better in one outcome and as good in the other
     for own in sorted(choices, key=lambda own: (own.outcomes[first], own.outcomes[second])):
         if not best or own.outcomes[second] < best[-1].outcomes[second]:
             best.append(own)

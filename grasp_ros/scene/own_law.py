@@ -28,12 +28,10 @@ def find_law(place: str, what: str) -> Law | type:
         sys.path.append(here)  # last: a file of the user's does not take the place of a library
     try:
         holder: Any = import_module(module)
-    except ModuleNotFoundError as error:
-        if error.name is None or not f"{module}.".startswith(f"{error.name}."):
-            raise Refused(f"{what}: {module} cannot be imported: {error}") from None
-        raise Refused(f"{what}: no module {error.name}; allowed: one of the current directory, or one that is"
-                      " installed") from None
     except (ImportError, SyntaxError) as error:
+        if isinstance(error, ModuleNotFoundError) and f"{module}.".startswith(f"{error.name}."):
+            raise Refused(f"{what}: no module {error.name}; allowed: one of the current directory, or one that is"
+                          " installed") from None
         raise Refused(f"{what}: {module} cannot be imported: {error}") from None
     except FAULTS as error:
         raise Refused(f"{what}: {module} cannot be imported: {described(error)}") from error

@@ -25,31 +25,24 @@ def apply(settings: Sequence[str], document: dict[Any, Any]) -> None:
     for target, count in Counter(setting.partition("=")[0] for setting in settings).items():
         if count > 1:
             raise SceneError(f"setting {target}: given {count} times; allowed: once")
-    for setting in sorted(settings, key=lambda one: not one.endswith("={}")):  # before others give the section numbers
-        _apply(setting, document)
-
-
-def _apply(setting: str, document: dict[Any, Any]) -> None:
-    match = re.fullmatch(r"(\w+)(?:\.(\w+)=(.*)|=\{\})", setting)
-    if match is None:
-        raise SceneError(f"setting {setting}: not understood; allowed: section.key=value, or section={{}}")
-    section, key, value = match.groups()
-    if key is None:
-        if section not in BY_SECTION:
-            raise SceneError(f"setting {setting}: no such section; {allowed(section, BY_SECTION)}")
-        if document.setdefault(section, {}):
-            raise SceneError(f"setting {setting}: {section} has numbers, which stay; allowed: {section}.key=value")
-        return
     known = [f"{name}.{parameter.key}" for name, effect in BY_SECTION.items() for parameter in effect.parameters]
-    if f"{section}.{key}" not in known:
-        raise SceneError(f"setting {setting}: no such key; {allowed(f'{section}.{key}', known)}")
-    try:
-        number = load(value)
-    except Refused as error:
-        raise SceneError(f"setting {setting}: {error}; allowed: a number") from None
-    numbers = document.setdefault(section, {})
-    if isinstance(numbers, dict):  # anything else is refused with the file
-        numbers[key] = number
+    for setting in sorted(settings, key=lambda one: not one.endswith("={}")):  # before others give the section numbers
+        match = re.fullmatch(r"(\w+)(?:\.(\w+)=(.*)|=\{\})", setting)
+        if match is None:
+            raise SceneError(f"setting {setting}: not understood; allowed: section.key=value, or section={{}}")
+        section, key, value = match.groups()
+        if key is None and section not in BY_SECTION:
+            raise SceneError(f"setting {setting}: no such section; {allowed(section, BY_SECTION)}")
+        if key is not None and f"{section}.{key}" not in known:
+            raise SceneError(f"setting {setting}: no such key; {allowed(f'{section}.{key}', known)}")
+        numbers = document.setdefault(section, {})
+        if key is None and numbers:
+            raise SceneError(f"setting {setting}: {section} has numbers, which stay; allowed: {section}.key=value")
+        if key is not None and isinstance(numbers, dict):  # anything else is refused with the file
+            try:
+                numbers[key] = load(value)
+            except Refused as error:
+                raise SceneError(f"setting {setting}: {error}; allowed: a number") from None
 
 
 def texts_of_changed(title: str, watch: str, before: Mapping[str, Any] | None, values: Mapping[str, Any]
@@ -58,19 +51,15 @@ def texts_of_changed(title: str, watch: str, before: Mapping[str, Any] | None, v
 
     How long a scene lasts does not count. None: nothing was before.
     """
-    changes = [] if before is None else _differences(before, values)
+    if before is None:
+        return title, watch
+    changes = [f"{section}={{}}" for section, numbers in values.items() if section not in before and not numbers]
+    for section, numbers in values.items():
+        for key, value in numbers.items():
+            if before.get(section, {}).get(key) != value and (section, key) != ("time", "duration_s"):
+                changes.append(f"{section}.{key}={'...' if isinstance(value, tuple) else f'{value:g}'}")
     if not changes:
         return title, watch
     base = CHANGED.sub("", title)
     words = ", ".join(changes) if len(changes) <= FEW and base == title else "other numbers"
     return f"{base} [{words}]", ""
-
-
-def _differences(before: Mapping[str, Any], values: Mapping[str, Any]) -> list[str]:
-    """What is other than before, as settings would say it."""
-    found = [f"{section}={{}}" for section, numbers in values.items() if section not in before and not numbers]
-    for section, numbers in values.items():
-        for key, value in numbers.items():
-            if before.get(section, {}).get(key) != value and (section, key) != ("time", "duration_s"):
-                found.append(f"{section}.{key}={'...' if isinstance(value, tuple) else f'{value:g}'}")
-    return found

@@ -10,14 +10,11 @@ SHOWN = 12  # of many words that are allowed
 ALIKE, TIE, MOST_MEANT = 0.65, 1e-9, 4  # of difflib; words that are as much alike are all named
 
 
-def _alike(word: str, name: str) -> float:
-    return SequenceMatcher(None, name, word).ratio()
-
-
 def allowed(word: str, known: Collection[str], other: str = "") -> str:
     """The end of a refusal: the known word that is meant, or the first that are allowed, behind `other` words."""
-    close = get_close_matches(str(word), known, MOST_MEANT, ALIKE)
-    best = [name for name in close if _alike(word, name) >= _alike(word, close[0]) - TIE]
+    close = get_close_matches(word, known, MOST_MEANT, ALIKE)
+    alike = {name: SequenceMatcher(None, name, word).ratio() for name in close}
+    best = [name for name in close if alike[name] >= alike[close[0]] - TIE]
     if best:
         return f"did you mean {' or '.join(sorted(best))}?"
     rest = f", ... {len(known)} in all" if len(known) > SHOWN else ""
