@@ -41,8 +41,7 @@ def add_to(commands: Any) -> None:
 
 def _design(options: argparse.Namespace) -> int:
     from grasp_ros.maps.plan import read_axis
-    from grasp_ros.optimization.problem import DesignProblem, read_bound
-    from grasp_ros.optimization.search import Design, front, search
+    from grasp_ros.optimization.search import Design, DesignProblem, front, read_bound, search
     from grasp_ros.simulation.chunk import Setup
 
     scene = load_scene(options.scene, options.settings)

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from grasp_ros.optimization.problem import DesignProblem
-from grasp_ros.optimization.search import Design
+from grasp_ros.optimization.search import Design, DesignProblem
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Figure
 
