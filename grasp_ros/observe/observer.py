@@ -243,8 +243,7 @@ def watch(integrator: Integrator, wanted: Wanted, bound: float) -> RunObserver:
     memory.loop[:], memory.own[:], memory.base[:] = system.closed_loop, system.bodies, system.bodies
     if integrator.continuous:
         memory.base[:], memory.switches[Switch.CERTAIN] = memory.loop, not system.caveats
-        for side, law in system.laws.items():
-            memory.gains[side] = law.row[: Column.SET_POINT]
+        memory.gains[:] = system.law_rows[:, : Column.SET_POINT]
     run_observer.begin(bound)
     integrator.observer = run_observer
     return run_observer

@@ -17,6 +17,7 @@ from grasp_ros.physics.control import Column, ControlLaw, feedback
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of
 from grasp_ros.physics.model import Arm, Array, impact_force_of
 
+NO_LAW = ControlLaw()
 BODIES = (LEFT, OBJECT, RIGHT)  # in the order of the state
 NAMES: dict[int, str] = {LEFT: "left", OBJECT: "object", RIGHT: "right"}
 Place = tuple[str, int, int]  # array of a system, row, column
@@ -93,6 +94,11 @@ class System:
             (mass, stiffness, damping, force), (kp, kv, set_point, feed_forward, *_) = bodies[side], law.row.tolist()
             bodies[side] = [mass, stiffness + kp, damping + kv, force + (kp * set_point + feed_forward)]
         return bodies
+
+    @property
+    def law_rows(self) -> Array:
+        """Laws of the controllers (2, k), rows of `control` by side; without a controller a row that answers 0."""
+        return np.array([self.laws.get(side, NO_LAW).row for side in (LEFT, RIGHT)])
 
     def arm(self, side: int) -> Arm:
         """An arm with the gains of its controller."""

@@ -153,16 +153,7 @@ def _numbers(system: System, ticks: int) -> tuple[Array, ...]:
     """The arrays of a system, in the order of `Directions`."""
     external = system.external_over(np.arange(ticks)) if ticks else np.zeros((0, 3))
     return (system.bodies, system.pairs, system.state, np.array([system.coulomb]),
-            np.minimum(law_rows(system), LARGEST), external)
-
-
-def law_rows(system: System) -> Array:
-    """Laws of the sampled controllers, rows of `physics.control` by side; without one a row that answers 0."""
-    rows = np.zeros((2, len(Column)))
-    rows[:, Column.LIMIT] = np.inf
-    for side, law in system.laws.items():
-        rows[side] = law.row
-    return rows
+            np.minimum(system.law_rows, LARGEST), external)
 
 
 def closing(side: int, state: Array) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ from grasp_ros.exact.records import Integers, Tables
 from grasp_ros.physics.control import normals_over
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.sensitivity.directions import Directions, law_rows
+from grasp_ros.sensitivity.directions import Directions
 from grasp_ros.sensitivity.propagate import propagate
 from grasp_ros.sensitivity.tangents import Count, Number, tangents_of
 
@@ -54,7 +54,7 @@ class Carrier:
                 if law.seed is not None:
                     normals[:, side] = normals_over(law.seed, 0, scene.ticks + 1)
             self._tangents = self._tangents._replace(inputs=self._tangents.inputs._replace(
-                control=law_rows(system), control_rates=directions.laws, normals=normals,
+                control=system.law_rows, control_rates=directions.laws, normals=normals,
                 waiting=np.zeros((system.delay, 2, self.x.shape[1]))))
 
     def attach(self, tables: Tables) -> Integers:

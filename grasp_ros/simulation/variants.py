@@ -33,7 +33,7 @@ class Block:
     pairs: Array  # (n, 2, 2)
     state: Array  # (n, 6, 1)
     coulomb: Array  # (n, 1, 1)
-    laws: Array  # (n, 2, 4): Kp, Kv, set-point, feed-forward
+    laws: Array  # (n, 2, k), see `physics.control.Column`
 
     @property
     def closed_loop(self) -> Array:
@@ -102,11 +102,8 @@ class Variants:
     def block(self) -> Block:
         """The rows as arrays; to be called only if `is_plain`."""
         system, n = self.scene.system, self.rows
-        laws = np.zeros((2, 4))
-        for side, law in system.laws.items():
-            laws[side] = law.row[: Column.POSITION_NOISE]
         block = Block(*(np.repeat(array[None], n, axis=0) for array in (
-            system.bodies, system.pairs, system.state[:, None], np.full((1, 1), system.coulomb), laws,
+            system.bodies, system.pairs, system.state[:, None], np.full((1, 1), system.coulomb), system.law_rows,
         )))
         for name, column in self.changes.items():
             array, row, place = PLACES[name]
