@@ -79,8 +79,9 @@ def _plot(options: argparse.Namespace) -> int:
         note(f"written to {output}")
         return 0
     panels = [plots.PANELS[name] for name in options.panels or plots.PANELS]
-    if isinstance(motions[0], Trajectory) and motions[0].sensitivity is not None:
-        panels += sensitivity_panels(motions[0].sensitivity)
+    if isinstance(motions[0], Trajectory) and (found := motions[0].sensitivity) is not None:
+        panels += [plots.Panel(partial(_draw, found, place), "derivative, m per unit", 2)
+                   for place in range(len(found.keys))]
     figure = plots.compose(motions, width_mm=options.width, span=span, panels=panels)
     write_figure(figure, output)
     return 0
@@ -130,12 +131,8 @@ def _beside(source: str, ending: str) -> Path:
         return Path(f"{path.resolve()}{ending}") if path.is_dir() else path.with_suffix(ending)
 
 
-def sensitivity_panels(found: Sensitivity) -> list[plots.Panel]:
-    """A panel for each number: derivatives of the positions by it, over time."""
-    return [plots.Panel(partial(_draw, found, place), "derivative, m per unit", 2) for place in range(len(found.keys))]
-
-
 def _draw(found: Sensitivity, place: int, axes: Axes, _: Motion) -> None:
+    """Derivatives of the positions by one number, over time."""
     rates = found.state_rates[:, ::2, place]
     sizes = np.abs(rates[rates != 0.0])
     if len(sizes) and sizes.max() > WIDE * np.median(sizes):

@@ -41,13 +41,18 @@ def describe_trajectory(trajectory: Trajectory, found: dict[str, Any]) -> list[R
     """What happened in a simulation, in words, with its `summary`; inf and nan are shown as they are."""
     method, own = METHODS[trajectory.method], found["controllers"]
     of = "" if trajectory.status is Status.DONE else f" of {found['duration_s']:g} s"
+    touches = "not looked for"
+    if method.events:
+        clamps, sticks = sum(found["clamped"].values()), found["sticks"]  # which are rare
+        touches = ", ".join(map(str, found["touches"].values()))
+        touches += (f"; {clamps} times u' < -1/p" if clamps else "") + (f"; {sticks} times stuck" if sticks else "")
     rows = [
         ("scene", found["title"]), ("feedback", found["feedback"]),
         *((f"{side} controller", name) for side, name in own.items()),
         ("status", trajectory.stop or trajectory.status.value),
         ("simulated", f"{found['reached_s']:g} s{of}, {found['output_times']} output times"),
         *([("at rest", f"from {found['at_rest_s']:.6g} s on")] if "at_rest_s" in found else []),
-        ("touches left, right", _touches(found) if method.events else "not looked for"),
+        ("touches left, right", touches),
         ("method", f"{method.name}, {method.knob} {trajectory.setting:g}{UNITS[method.knob]}"),
         ("work", ", ".join(f"{number} {name}" for name, number in found["work"].items())),
     ]
@@ -83,13 +88,6 @@ def _amounts(found: dict[str, Any]) -> list[Row]:
     if "work_external_J" in found:
         rows.append(("external work, J", f"{found['work_external_J']:.4g}"))
     return rows
-
-
-def _touches(found: dict[str, Any]) -> str:
-    """Touches of both sides; what is rare only where it happens."""
-    clamps, sticks = sum(found["clamped"].values()), found["sticks"]
-    text = ", ".join(map(str, found["touches"].values()))
-    return text + (f"; {clamps} times u' < -1/p" if clamps else "") + (f"; {sticks} times stuck" if sticks else "")
 
 
 def describe_sensitivity(found: Sensitivity) -> Iterable[Row]:

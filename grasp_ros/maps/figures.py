@@ -54,7 +54,9 @@ def heat(axes: Axes, plan: Plan, values: np.ndarray, label: str) -> None:
     shown = np.ma.masked_invalid(values)
     colors = colormaps[COLORS].with_extremes(bad=MISSING)
     y, x = plan.axes
-    mesh = axes.pcolormesh(edges(x), edges(y), shown, cmap=colors, norm=_norm(shown), rasterized=True)
+    far = shown.count() and shown.min() > 0.0 and shown.max() > LOG_FROM * shown.min()
+    norm = LogNorm() if far else Normalize()
+    mesh = axes.pcolormesh(edges(x), edges(y), shown, cmap=colors, norm=norm, rasterized=True)
     axes.figure.colorbar(mesh, ax=axes, label=label)
     axes.set(xlabel=label_of(x.name), xscale=_scale(x), ylabel=label_of(y.name), yscale=_scale(y))
 
@@ -62,12 +64,6 @@ def heat(axes: Axes, plan: Plan, values: np.ndarray, label: str) -> None:
 def edges(axis: Axis) -> np.ndarray:
     """Between which the pixels lie (n + 1,): halfway between the values, and as far beyond the first and the last."""
     return axis.at((np.arange(axis.points + 1) - 0.5) / (axis.points - 1))
-
-
-def _norm(shown: Any) -> Normalize:
-    if shown.count() and shown.min() > 0.0 and shown.max() > LOG_FROM * shown.min():
-        return LogNorm()
-    return Normalize()
 
 
 def _dot(count: int) -> float:

@@ -77,14 +77,12 @@ class Table(Frozen):
     @property
     def units(self) -> dict[str, str]:
         """Units of the numbers and of the outcomes, by column."""
-        numbers = {name: parameter_of(self.scene, name).unit for name in self.changes}
-        return {**numbers, **{name: self._unit(name) for name in self.columns}}
-
-    def _unit(self, column: str) -> str:
-        """Of an outcome, or of its derivative by a number."""
-        name, _, key = column.partition(BY)
-        unit = {V_C_END: "J", CORNER: "s"}.get(name) or OUTCOMES[name].unit
-        return f"{unit} per {parameter_of(self.scene, key).unit}" if key else unit
+        found = {name: parameter_of(self.scene, name).unit for name in self.changes}
+        for column in self.columns:  # an outcome, or its derivative by a number
+            name, _, key = column.partition(BY)
+            unit = {V_C_END: "J", CORNER: "s"}.get(name) or OUTCOMES[name].unit
+            found[column] = f"{unit} per {parameter_of(self.scene, key).unit}" if key else unit
+        return found
 
     def dataframe(self) -> Any:
         """A `pandas.DataFrame`, a row for each run: numbers, outcomes and `status`; units in its `attrs["units"]`.

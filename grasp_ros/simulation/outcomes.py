@@ -53,11 +53,6 @@ def _settled(body: int) -> Callable[[Runs], Array]:
                                  runs.seen[:, Seen.SETTLED])
 
 
-def _last_outside(runs: Runs) -> Array:
-    """Of all bodies that are there."""
-    return np.asarray(np.fmax.reduce(runs.seen[:, Seen.LAST_OUTSIDE : SEEN], axis=1))
-
-
 def _largest(q: int) -> Callable[[Runs], Array]:
     return lambda runs: np.maximum(np.abs(runs.seen[:, Seen.LOW + q]), np.abs(runs.seen[:, Seen.HIGH + q]))
 
@@ -76,7 +71,8 @@ _GROUPS: dict[str, tuple[Outcome, ...]] = {
                 _settled(body)) for body, name in NAMES.items()),
     "last_outside": (Outcome(
         "last_outside", "s", "last time within the run at which a mass is outside the bound, of every scene, and no"
-        " proof of what follows; inf: at its end", Wanted.BOUND, _last_outside),),
+        " proof of what follows; inf: at its end", Wanted.BOUND,
+        lambda runs: np.asarray(np.fmax.reduce(runs.seen[:, Seen.LAST_OUTSIDE : SEEN], axis=1))),),
     "last_outside_times": tuple(
         Outcome(f"last_outside_{name}", "s", f"the same of the {name} mass alone", Wanted.BOUND,
                 _column("seen", Seen.LAST_OUTSIDE + body)) for body, name in NAMES.items()),
