@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import glob
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,10 @@ from grasp_ros import scene as scenes
 from grasp_ros.cli.commands import COMMANDS
 from grasp_ros.cli.parser import Command, add_levels
 from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
+from grasp_ros.physics.control import Law
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene.effects.base import SIDES
+from grasp_ros.scene.own_law import find_law
 
 Options = argparse.ArgumentParser | argparse._ArgumentGroup
 
@@ -94,3 +98,22 @@ def whole(least: int) -> Callable[[str], int]:
         return int(word)
 
     return read
+
+
+def sides_of(words: Sequence[str]) -> dict[str, str]:
+    """Where the controllers of `--controller` are found, "module:object" by side."""
+    found: dict[str, str] = {}
+    for word in words:
+        side, _, place = word.partition("=")
+        if side not in SIDES or not all(place.partition(":")):
+            raise Refused(f"--controller: {word} is not allowed; allowed: side=module:object, with the side"
+                          f" {' or '.join(SIDES)}")
+        if side in found:
+            raise Refused(f"--controller: {word} is not allowed; allowed: one for the {side} side")
+        found[side] = place
+    return found
+
+
+def load_controllers(words: Sequence[str]) -> dict[str, Law | type]:
+    """The callables by side."""
+    return {side: find_law(place, f"--controller: {side}={place}") for side, place in sides_of(words).items()}

@@ -16,10 +16,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene
+from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, sides_of
 from grasp_ros.cli.bags import add_limits, check_limits, keeps
 from grasp_ros.cli.checks import load_scene, prepare
-from grasp_ros.cli.controllers import sides_of
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
 from grasp_ros.graph.bag.errors import BagError, EmptyBagError
 from grasp_ros.graph.host import check_reach, hold, network

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from grasp_ros import scene as scenes
-from grasp_ros.cli.controllers import load_controllers
+from grasp_ros.cli.arguments import load_controllers
 from grasp_ros.graph.nodes.controller import OwnLaw
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT
