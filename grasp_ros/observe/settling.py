@@ -13,11 +13,11 @@ from grasp_ros.exact.numerics.roots import first_rise, shift, value_and_rate
 from grasp_ros.exact.records import Array, Regime
 from grasp_ros.observe.extremes import FIRST, ROW, WORK, expand_quantity, extremes_of, first_zero, may_exceed
 from grasp_ros.observe.record import UNDECIDED, Memory, Seen, SegmentRecord
-from grasp_ros.physics import reach as bounds
+from grasp_ros.physics import lyapunov
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Slide
 
 BISECTIONS = 60
-reach = kernel(bounds.reach)
+reach = kernel(lyapunov.reach)
 
 
 @inlined

@@ -1,18 +1,22 @@
-"""The paper's Lyapunov function in its parts: V_l, V_o, V_r of (29), and the deformation of (35).
+"""The paper's Lyapunov function: its parts V_l, V_o, V_r of (29), the deformation of (35), and what its level bounds.
 
 With a pair open its terms are absent, so that (16), (21) and (28) are one function in the conditions of contact. V is
 twice the energy.
+
+How far a level of V_c lets the bodies go proves that a motion has settled for good: V_c >= K x^2 bounds an arm,
+V_c >= (4/5) H u^(5/2) a deformation, and the arms enclose the object, (35) to (37). Where V_c never rises, under
+continuous feedback to 0, that bounds all that follows.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from grasp_ros.physics.energy import elastic_level, mechanical_levels, pairs_of
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of
 from grasp_ros.physics.model import Array, Contact, in_contact
-from grasp_ros.physics.reach import reach
 from grasp_ros.physics.system import BODIES, System
 
 
@@ -52,6 +56,28 @@ def deformation(system: System, state: Array) -> Array:
 def largest_deformation(system: System, state: Array) -> Array:
     """Epsilon of (35), (36) along a motion (n, 6): the largest deformation so far, (n, 2) in m."""
     return np.asarray(np.maximum.accumulate(deformation(system, state), axis=0))
+
+
+def reach(bodies: Any, pairs: Any, V_c: Any) -> Any:
+    """Largest displacements of left arm, object and right arm, and largest deformations of both pairs, in m.
+
+    An arm that is not driven to 0, an object that the arms do not enclose or that a force pushes, and a pair that
+    cannot push have no bound: infinite. What is not there stays at 0. `bodies` (3, 4) have the feedback in them,
+    `pairs` are (2, 2), see `layout`; `V_c` is in J. `observe.settling` compiles the same source for its kernels.
+    """
+    left = middle = right = 0.0
+    if bodies[LEFT, Of.MASS] > 0.0:
+        driven = bodies[LEFT, Of.STIFFNESS] > 0.0 and bodies[LEFT, Of.FORCE] == 0.0
+        left = np.sqrt(V_c / bodies[LEFT, Of.STIFFNESS]) if driven else np.inf
+    if bodies[RIGHT, Of.MASS] > 0.0:
+        driven = bodies[RIGHT, Of.STIFFNESS] > 0.0 and bodies[RIGHT, Of.FORCE] == 0.0
+        right = np.sqrt(V_c / bodies[RIGHT, Of.STIFFNESS]) if driven else np.inf
+    u_l = (1.25 * V_c / pairs[LEFT, Law.HERTZIAN]) ** 0.4 if pairs[LEFT, Law.HERTZIAN] > 0.0 else np.inf
+    u_r = (1.25 * V_c / pairs[RIGHT, Law.HERTZIAN]) ** 0.4 if pairs[RIGHT, Law.HERTZIAN] > 0.0 else np.inf
+    if bodies[OBJECT, Of.MASS] > 0.0:
+        arms = bodies[LEFT, Of.MASS] > 0.0 and bodies[RIGHT, Of.MASS] > 0.0
+        middle = max(left + u_l, right + u_r) if arms and bodies[OBJECT, Of.FORCE] == 0.0 else np.inf
+    return left, middle, right, u_l, u_r
 
 
 def displacement_bound(system: System, V_c: float) -> Array:

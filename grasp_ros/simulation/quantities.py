@@ -1,8 +1,8 @@
 """What a motion amounts to in a few numbers: settling times, contacts and impact forces.
 
 Settled is one definition for the whole package: no mass leaves 2 % of the largest initial displacement any more, for
-good, which V_c proves: it never rises, and its level bounds what follows, see `physics.reach`. A run goes on past its
-horizon until that is decided. What V_c does not prove within HORIZONS horizons is not settled.
+good, which V_c proves: it never rises, and its level bounds what follows, see `physics.lyapunov`. A run goes on past
+its horizon until that is decided. What V_c does not prove within HORIZONS horizons is not settled.
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@ import numpy as np
 from grasp_ros.physics import lyapunov
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.lyapunov import reach
 from grasp_ros.physics.model import Array, Mode
-from grasp_ros.physics.reach import reach
 from lab.paper import by_hand
 from lab.paper.equation_table import DRAWS
 from lab.paper.sample import Sample

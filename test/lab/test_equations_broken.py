@@ -14,8 +14,8 @@ from grasp_ros import scene as scenes
 from grasp_ros.physics import lyapunov
 from grasp_ros.physics.energy import Energy, energy, pairs_of
 from grasp_ros.physics.layout import LEFT
+from grasp_ros.physics.lyapunov import reach
 from grasp_ros.physics.model import impact_force, in_contact, penetration
-from grasp_ros.physics.reach import reach
 from grasp_ros.physics.system import System
 from lab.paper import by_hand, conditions, equations, sample
 from lab.paper.cases import load_cases

@@ -7,8 +7,7 @@ import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.energy import energy
-from grasp_ros.physics.lyapunov import deformation, displacement_bound, largest_deformation, parts
-from grasp_ros.physics.reach import reach
+from grasp_ros.physics.lyapunov import deformation, displacement_bound, largest_deformation, parts, reach
 from grasp_ros.simulation import simulate
 from lab.paper import by_hand
 
