@@ -19,7 +19,7 @@ def error_against_time(scene: Scene, truth: Truth, records: Sequence[Record], ad
                        error: float | None, budget: float | None = None) -> Figure:
     """A figure of all sound records, with the limit of what can be known, what is wanted, and the choice."""
     with canvas.style():
-        figure, axes = canvas.subplots(figsize=(8.0, 5.2), layout="constrained")
+        figure, axes = canvas.subplots(figsize=(8.0, 5.2))
         _draw_methods(axes, truth, records)
         if error is not None:
             axes.axvline(error, color=CHOSEN, linewidth=0.8, linestyle="--")

@@ -17,8 +17,7 @@ def measured_and_fitted(found: Fit) -> Figure:
     seen = np.isfinite(found.noise)
     parts = [(label, part) for label, part in PARTS if seen[part::2].any()]
     with style({"font.size": 9.0}):
-        figure, panels = subplots(len(parts) + 1, figsize=(9.0, 2.4 * (len(parts) + 1)), layout="constrained",
-                                  sharex=True)
+        figure, panels = subplots(len(parts) + 1, figsize=(9.0, 2.4 * (len(parts) + 1)), sharex=True)
         for axes, (label, part) in zip(panels, parts, strict=False):
             for body, place in ((body, place + part) for body, place in COLUMN.items() if seen[place + part]):
                 axes.plot(found.t, found.measured[:, place], ".", color=COLORS[body], markersize=2.5, alpha=0.4)

@@ -30,7 +30,7 @@ def draw(data: Any, plan: Plan, outcome: str, path: Path) -> None:
     if plan.sample:
         _sample(data, plan, values, label, path)
         return
-    figure, axes = canvas.subplots(figsize=(8.0, 6.0), layout="constrained")
+    figure, axes = canvas.subplots(figsize=(8.0, 6.0))
     figure.suptitle(plan.scene.title, fontsize="medium")
     if len(plan.axes) == 1:
         x = plan.axes[0]
@@ -79,8 +79,7 @@ def _sample(data: Any, plan: Plan, values: np.ndarray, label: str, path: Path) -
     """The histogram, and the outcome over the numbers with which it goes most."""
     finite = np.isfinite(values)
     strongest = [name for name, _ in correlations(data, plan, values)][: MOST_COLUMNS - 1]
-    figure, columns = canvas.subplots(1, len(strongest) + 1, figsize=(3.6 * (len(strongest) + 1), 3.8), squeeze=False,
-                                   layout="constrained")
+    figure, columns = canvas.subplots(1, len(strongest) + 1, figsize=(3.6 * (len(strongest) + 1), 3.8), squeeze=False)
     figure.suptitle(f"{plan.scene.title}: {plan.sample} runs", fontsize="medium")
     first, *others = columns[0]
     first.hist(values[finite], bins=min(BINS, max(FEWEST_BINS, finite.sum() // RUNS_IN_A_BIN)), color="#0072b2")

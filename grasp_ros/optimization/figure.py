@@ -19,8 +19,7 @@ CHOSEN = "#d55e00"
 def around(problem: DesignProblem, choice: Design) -> Figure:
     """The first outcome along each free number, with the others as they were chosen; grey where a bound is broken."""
     count, name = len(problem.axes), problem.minimise[0]
-    figure, row = canvas.subplots(1, count, figsize=(4.2 * count + 1.0, 3.6), layout="constrained", squeeze=False,
-                                  sharey=True)
+    figure, row = canvas.subplots(1, count, figsize=(4.2 * count + 1.0, 3.6), squeeze=False, sharey=True)
     for axis, axes in zip(problem.axes, row[0], strict=True):
         values = axis.at(np.linspace(0.0, 1.0, POINTS))
         numbers = {key: np.full(POINTS, value) for key, value in choice.numbers.items()}
@@ -39,7 +38,7 @@ def around(problem: DesignProblem, choice: Design) -> Figure:
 @canvas.style()
 def tradeoff(problem: DesignProblem, choices: Sequence[Design]) -> Figure:
     """Two outcomes of choices none of which is better in both."""
-    figure, axes = canvas.subplots(figsize=(6.4, 4.8), layout="constrained")
+    figure, axes = canvas.subplots(figsize=(6.4, 4.8))
     first, second = problem.minimise
     x, y = ([own.outcomes[name] for own in choices] for name in (first, second))
     axes.plot(x, y, "o-", color=CHOSEN, drawstyle="steps-post", linewidth=0.8)

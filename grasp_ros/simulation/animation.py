@@ -69,7 +69,7 @@ def _stage(motion: Motion, times: Array, width_mm: float) -> tuple[Figure, Any]:
     first = np.searchsorted(motion.t, times, side="right").clip(1) - 1  # output time of each picture
     touched = np.logical_or.reduceat((motion.impacts > 0.0).any(axis=1), first)
     figure, (line, past) = canvas.subplots(2, 1, figsize=(width_mm / MM, width_mm / MM * HEIGHT_MM / WIDTH_MM),
-                                           height_ratios=(2, 3), layout="constrained")
+                                           height_ratios=(2, 3))
     low, high = (float(pick(list(positions.values()))) for pick in (np.min, np.max))
     reach = max(high - low, 1e-12)
     bodies, coils = _draw_line(line, list(positions), low - 0.25 * reach, high + 0.25 * reach, THICK * reach)

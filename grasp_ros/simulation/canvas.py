@@ -63,8 +63,7 @@ def figure(**settings: Any) -> Figure:
     return new
 
 
-def subplots(rows: int = 1, columns: int = 1, *, figsize: tuple[float, float], layout: Any = None, **settings: Any
-             ) -> tuple[Figure, Any]:
+def subplots(rows: int = 1, columns: int = 1, *, figsize: tuple[float, float], **settings: Any) -> tuple[Figure, Any]:
     """A new figure with its axes; see `matplotlib.figure.Figure.subplots`."""
-    new = figure(figsize=figsize, layout=layout)
+    new = figure(figsize=figsize, layout="constrained")
     return new, new.subplots(rows, columns, **settings)

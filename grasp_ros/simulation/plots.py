@@ -102,7 +102,7 @@ def compose(
     with canvas.style({"font.size": SMALL_LETTERS if small else LETTERS}):
         figure, grid = canvas.subplots(
             len(panels), len(motions), sharex="col", sharey="row", squeeze=False, height_ratios=shares,
-            figsize=(width / MM, height / MM), layout="constrained",
+            figsize=(width / MM, height / MM),
         )
         for column, (motion, caption) in enumerate(zip(motions, captions, strict=True)):
             title = _title(motion, caption, width / len(motions), small)

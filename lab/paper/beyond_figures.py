@@ -37,7 +37,7 @@ POINTS = {  # colour, mark, inside of the mark
 def gap(found: Gap) -> Drawing:
     """V and V_c of two scenes, and u' in units of -1/p."""
     figure, panels = canvas.subplots(
-        2, len(found.runs), sharex="col", sharey="row", figsize=(PAGE, 3.9), layout="constrained"
+        2, len(found.runs), sharex="col", sharey="row", figsize=(PAGE, 3.9)
     )
     for run, (top, bottom) in zip(found.runs, panels.T, strict=True):
         level = run.energy
@@ -65,7 +65,7 @@ def gap(found: Gap) -> Drawing:
 @canvas.style(STYLE)
 def tail(found: Tail) -> Drawing:
     """V_c beside its law, and the number of contacts."""
-    figure, (left, right) = canvas.subplots(1, 2, figsize=WIDE, layout="constrained")
+    figure, (left, right) = canvas.subplots(1, 2, figsize=WIDE)
     left.loglog(found.t, found.V_c, color="black", label="$V_c$ of No. 1")
     later = found.law < found.V_c[0]
     left.loglog(found.t[later], found.law[later], color=RIGHT_COLOR, linestyle="--",
@@ -86,7 +86,7 @@ def tail(found: Tail) -> Drawing:
 @canvas.style(STYLE)
 def chaos(found: Chaos) -> Drawing:
     """Growth of a perturbation, and the logarithm of the stretching behind the exponent."""
-    figure, (left, right) = canvas.subplots(1, 2, figsize=WIDE, layout="constrained")
+    figure, (left, right) = canvas.subplots(1, 2, figsize=WIDE)
     t, distance = found.apart
     left.semilogy(t, distance, color="black", linewidth=0.8)
     left.set(xlabel="time, s", ylabel=r"distance of two motions, in $\sqrt{V(0)}$")
@@ -104,7 +104,7 @@ def chaos(found: Chaos) -> Drawing:
 @canvas.style(STYLE)
 def stiffer(rows: Sequence[Stiffer]) -> Drawing:
     """Settling time over the stiffness, and what makes it."""
-    figure, panels = canvas.subplots(2, 2, sharex=True, figsize=(PAGE, 4.2), layout="constrained")
+    figure, panels = canvas.subplots(2, 2, sharex=True, figsize=(PAGE, 4.2))
     k = [row.k for row in rows]
     _bars(panels[0, 0], k, [row.settling for row in rows], "o-", "black", "with the object")
     _bars(panels[0, 0], k, [row.alone for row in rows], "s--", LEFT_COLOR, "arms alone")
@@ -129,7 +129,7 @@ def stiffer(rows: Sequence[Stiffer]) -> Drawing:
 @canvas.style(STYLE)
 def damped(rows: Sequence[Damped]) -> Drawing:
     """Settling times with and without the object, over the damping of the arms."""
-    figure, axes = canvas.subplots(figsize=(0.75 * PAGE, 3.0), layout="constrained")
+    figure, axes = canvas.subplots(figsize=(0.75 * PAGE, 3.0))
     lossy = [row for row in rows if row.C > 0.0]
     C = [row.C for row in lossy]
     _bars(axes, C, [row.together for row in lossy], "o-", "black", "with the object")
@@ -150,7 +150,7 @@ def damped(rows: Sequence[Damped]) -> Drawing:
 @canvas.style(STYLE)
 def stepped(cases: Mapping[int, Scene], numbers: Sequence[int] = (1, 2)) -> Drawing:
     """The paper's own method at plausible steps beside the exact motion: the object, and V_c."""
-    figure, panels = canvas.subplots(2, len(numbers), sharex=True, figsize=(PAGE, 4.0), layout="constrained")
+    figure, panels = canvas.subplots(2, len(numbers), sharex=True, figsize=(PAGE, 4.0))
     for number, (top, bottom) in zip(numbers, panels.T, strict=True):
         scene = cases[number]
         runs = [("exact", "black", "-", 2.2, simulate(scene))]
@@ -179,7 +179,7 @@ def stepped(cases: Mapping[int, Scene], numbers: Sequence[int] = (1, 2)) -> Draw
 def edge(rows: Sequence[Edge]) -> Drawing:
     """How an offset grows beside symmetric starts, and the settling times from there."""
     colors = ("black", RIGHT_COLOR, LEFT_COLOR, "#009e73", V_COLOR)
-    figure, (left, right) = canvas.subplots(1, 2, figsize=WIDE, width_ratios=(1.5, 1.0), layout="constrained")
+    figure, (left, right) = canvas.subplots(1, 2, figsize=WIDE, width_ratios=(1.5, 1.0))
     for row, color, mark in zip(rows, colors, "osD^v", strict=True):
         left.semilogy(row.t, row.apart, color=color, linewidth=0.7, label=f"No. {row.case}")
         if np.isfinite(row.settling).all():
@@ -217,7 +217,7 @@ class Curve(NamedTuple):
 def sweeps(curves: Sequence[Curve]) -> Drawing:
     """Ratios over parameters, with the side on which the statement says that they are."""
     rows = -(-len(curves) // 3)
-    figure, panels = canvas.subplots(rows, 3, figsize=(PAGE, 1.75 * rows), layout="constrained")
+    figure, panels = canvas.subplots(rows, 3, figsize=(PAGE, 1.75 * rows))
     for axes, each in zip(panels.ravel(), curves, strict=False):
         _sweep(axes, each)
     for axes in panels.ravel()[len(curves) :]:

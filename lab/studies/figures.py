@@ -54,7 +54,7 @@ def work_precision(records: Sequence[Record], metric: str, path: Path) -> None:
     scenes = by_scene(records)
     columns, rows = min(len(scenes) + 1, 3), -(-(len(scenes) + 1) // 3)
     figure, grid = canvas.subplots(
-        rows, columns, figsize=(WIDTH * columns, HEIGHT * rows), layout="constrained", squeeze=False)
+        rows, columns, figsize=(WIDTH * columns, HEIGHT * rows), squeeze=False)
     for axes, (name, here) in zip(grid.flat, scenes.items(), strict=False):
         for method, group in by_method(here).items():
             good = [record for record in group if record.good]
@@ -100,7 +100,7 @@ def contacts_missed(records: Sequence[Record], path: Path) -> None:
     """By how much the count of touches is wrong, against tolerance (above) and step (below)."""
     scenes = by_scene(records)
     figure, grid = canvas.subplots(
-        2, len(scenes), figsize=(2.6 * len(scenes), 5.2), sharey=True, sharex="row", layout="constrained", squeeze=False
+        2, len(scenes), figsize=(2.6 * len(scenes), 5.2), sharey=True, sharex="row", squeeze=False
     )
     for column, (name, own) in enumerate(scenes.items()):
         here = [record for record in own if record.found is not None]
@@ -130,7 +130,7 @@ def contacts_missed(records: Sequence[Record], path: Path) -> None:
 @canvas.style()
 def energy_drift(drifts: Sequence[Drift], path: Path) -> None:
     """Relative energy drift against time."""
-    figure, axes = canvas.subplots(figsize=(8.5, 4.8), layout="constrained")
+    figure, axes = canvas.subplots(figsize=(8.5, 4.8))
     for row in sorted(drifts, key=lambda row: -row.worst):
         label = f"{row.method}, {row.setting}: {row.worst:.0e}, {row.seconds:.2g} s"
         if not row.t:
@@ -153,7 +153,7 @@ def energy_drift(drifts: Sequence[Drift], path: Path) -> None:
 @canvas.style()
 def control_period(points: Sequence[Point], name: str, path: Path) -> None:
     """Deviation and price of the sampled loop against the control period."""
-    figure, (left, right) = canvas.subplots(1, 2, figsize=(9.5, 4.0), layout="constrained")
+    figure, (left, right) = canvas.subplots(1, 2, figsize=(9.5, 4.0))
     period = [point.period_ms for point in points]
     left.plot(period, [point.deviation for point in points], "o-", color="#0072b2")
     deviation = "largest deviation of a position\nfrom continuous feedback, m"
@@ -184,7 +184,7 @@ def control_period(points: Sequence[Point], name: str, path: Path) -> None:
 @canvas.style()
 def prediction(predictions: Sequence[Prediction], path: Path) -> None:
     """How two roundings grow."""
-    figure, axes = canvas.subplots(figsize=(8.0, 4.4), layout="constrained")
+    figure, axes = canvas.subplots(figsize=(8.0, 4.4))
     shades = ("#0072b2", "#e69f00", "#d55e00", "#009e73", "#cc79a7", "#000000")
     for row, shade in zip(predictions, cycle(shades), strict=False):
         there = row.distance > 0.0
@@ -214,7 +214,7 @@ def stability(curves: dict[str, tuple[Any, Any]], points: Any, limits: dict[str,
     limits : dict
         By label: the first period at which the radius is 1, s.
     """
-    figure, axes = canvas.subplots(figsize=(7.5, 4.0), layout="constrained")
+    figure, axes = canvas.subplots(figsize=(7.5, 4.0))
     for (label, (period, radius)), shade in zip(curves.items(), ("#0072b2", "#d55e00"), strict=False):
         text = f"{label}: stable to {1e3 * limits[label]:.4g} ms"
         axes.plot(1e3 * np.asarray(period), radius, color=shade, label=text)

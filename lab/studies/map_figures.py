@@ -22,7 +22,7 @@ GAIN, LOSS = "Kp of both arms, N/m", "p of both contacts, s/m"
 @canvas.style()
 def settling(found: Settling, path: Path) -> None:
     """The map, and a window of it, whose place the map shows."""
-    figure, both = canvas.subplots(1, 2, figsize=(13.0, 5.6), layout="constrained")
+    figure, both = canvas.subplots(1, 2, figsize=(13.0, 5.6))
     title = f"case 3: seconds until it has settled for good; grey: not within {found.within:g} s"
     figure.suptitle(title, fontsize="medium")
     for axes, plan, data in zip(both, (found.plan, found.zoom), (found.data, found.zoomed), strict=True):
@@ -38,7 +38,7 @@ def settling(found: Settling, path: Path) -> None:
 def limits(found: Limits, path: Path) -> None:
     """Unstable runs of the four loops over period and gain, with the exact limit of a free arm."""
     colors = ListedColormap([STABLE, UNSTABLE])
-    figure, all_axes = canvas.subplots(2, 2, figsize=(10.0, 7.5), sharex=True, sharey=True, layout="constrained")
+    figure, all_axes = canvas.subplots(2, 2, figsize=(10.0, 7.5), sharex=True, sharey=True)
     for axes, loop in zip(all_axes.flat, found.loops, strict=True):
         axes.pcolormesh(1e3 * found.periods, found.gains, loop.unstable, cmap=colors, vmin=0, vmax=1)
         axes.contour(1e3 * found.periods, found.gains, found.radius[loop.delay], [1.0], colors=FREE, linewidths=LIMIT)

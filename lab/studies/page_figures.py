@@ -20,7 +20,7 @@ OUTCOMES = {KEPT: (LEFT_COLOR, "", "white"), BROKEN: ("#f2a65a", "////", "black"
 def effect_costs(rows: Sequence[tuple[str, float, float]], path: Path) -> None:
     """Draw what variants of a scene cost: name, us per control period, kB per simulated second."""
     names = [name for name, _, _ in rows]
-    figure, panels = canvas.subplots(1, 2, sharey=True, figsize=(9.0, 0.3 * len(rows) + 1.2), layout="constrained")
+    figure, panels = canvas.subplots(1, 2, sharey=True, figsize=(9.0, 0.3 * len(rows) + 1.2))
     for axes, column, label in zip(panels, (1, 2), ("us per control period, no ROS", "bag, kB per s"), strict=True):
         values = [float(row[column]) for row in rows]
         bars = axes.barh(names, values, color=[OBJECT_COLOR if name == names[0] else LEFT_COLOR for name in names])
@@ -36,7 +36,7 @@ def effect_costs(rows: Sequence[tuple[str, float, float]], path: Path) -> None:
 def hard_cases(rows: Mapping[str, Sequence[Counter[str] | None]], solvers: Sequence[str], path: Path) -> None:
     """Draw how many cases of each family each solver keeps, breaks, or has no result of; None: it was not asked."""
     size = (2.2 + 2.6 * len(solvers), 0.33 * len(rows) + 1.2)
-    figure, panels = canvas.subplots(1, len(solvers), sharey=True, squeeze=False, figsize=size, layout="constrained")
+    figure, panels = canvas.subplots(1, len(solvers), sharey=True, squeeze=False, figsize=size)
     for place, (axes, solver) in enumerate(zip(panels[0], solvers, strict=True)):
         for row, counts in enumerate(each[place] for each in rows.values()):
             _outcomes(axes, row, counts)
