@@ -9,7 +9,7 @@ import numpy as np
 
 from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.exact.impact import damping_factor, elastic_force
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Of, Pair, Transition
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of, Pair, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
 
@@ -55,14 +55,6 @@ def rates(q: Any, push_l: bool, push_r: bool, y: Any) -> Any:
 
 
 @kernel
-def along(y: Any, h: float, f: Any) -> Any:
-    """y + h f of six components."""
-    return (
-        y[0] + h * f[0], y[1] + h * f[1], y[2] + h * f[2], y[3] + h * f[3], y[4] + h * f[4], y[5] + h * f[5],
-    )
-
-
-@kernel
 def relative(y: Any, side: int) -> Any:
     """u and u' of one pair, (8)."""
     if side == LEFT:
@@ -87,23 +79,6 @@ def kind_of(before: int, after: int) -> int:
     if before == OPEN:
         return TOUCH
     return CLAMP if after == CLAMPED else REENTRY
-
-
-@kernel
-def note(events: Any, count: int, time: float, side: Body, kind: int, y: Any) -> None:
-    """Write one row of the record of events."""
-    u, d = relative(y, side)
-    events[count, 0], events[count, 1], events[count, 2] = time, side.value, kind
-    events[count, 3], events[count, 4] = u, d
-
-
-@kernel
-def hermite(y: Any, f: Any, z: Any, g: Any, h: float, theta: float) -> Any:
-    """Cubic interpolant of a step from y (slope f) to z (slope g), at the fraction theta; error O(h^4)."""
-    a = theta * theta * (3.0 - 2.0 * theta)
-    b = h * theta * (1.0 - theta) ** 2
-    c = h * theta * theta * (theta - 1.0)
-    return along(along(along(y, a, along(z, -1.0, y)), b, f), c, g)
 
 
 @kernel

@@ -35,17 +35,14 @@ from grasp_ros.methods.equations import (
     OPEN,
     SLIVER,
     Work,
-    along,
     condition,
-    hermite,
     kind_of,
-    note,
     parameters,
     put,
     rates,
     relative,
 )
-from grasp_ros.physics.layout import EPS, LEFT, RIGHT
+from grasp_ros.physics.layout import EPS, LEFT, RIGHT, Body
 
 PLAIN, PAPER, LOCATED = 0, 1, 2
 MOST_EVENTS = 10**6  # rows of memory, which is only taken where it is written
@@ -60,6 +57,31 @@ def solve(rule: int, problem: Problem) -> Solution:
     events = np.empty((0 if rule == PLAIN else min(problem.max_events, MOST_EVENTS), 5))
     outcome, rows, found = run(rule, q, y, problem.duration, problem.grid, problem.setting, out, events, work)
     return Solution(out[:rows], events[:found].copy(), work, _STATUS[outcome])
+
+
+@kernel
+def along(y: Any, h: float, f: Any) -> Any:
+    """y + h f of six components."""
+    return (
+        y[0] + h * f[0], y[1] + h * f[1], y[2] + h * f[2], y[3] + h * f[3], y[4] + h * f[4], y[5] + h * f[5],
+    )
+
+
+@kernel
+def hermite(y: Any, f: Any, z: Any, g: Any, h: float, theta: float) -> Any:
+    """Cubic interpolant of a step from y (slope f) to z (slope g), at the fraction theta; error O(h^4)."""
+    a = theta * theta * (3.0 - 2.0 * theta)
+    b = h * theta * (1.0 - theta) ** 2
+    c = h * theta * theta * (theta - 1.0)
+    return along(along(along(y, a, along(z, -1.0, y)), b, f), c, g)
+
+
+@kernel
+def note(events: Any, count: int, time: float, side: Body, kind: int, y: Any) -> None:
+    """Write one row of the record of events."""
+    u, d = relative(y, side)
+    events[count, 0], events[count, 1], events[count, 2] = time, side.value, kind
+    events[count, 3], events[count, 4] = u, d
 
 
 @kernel

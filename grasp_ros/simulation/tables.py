@@ -70,13 +70,12 @@ class Column(NamedTuple):
     text: str
 
 
-_BODIES = [NAMES[body] for body in BODIES]
 TIME = Column("t", "s", "time")
 COLUMNS: tuple[Column, ...] = (
     *(Column(f"{symbol}_{name}", unit, f"{text} of the {name} mass")
-      for name in _BODIES for symbol, unit, text in (("x", "m", "position"), ("v", "m/s", "velocity"))),
+      for name in NAMES.values() for symbol, unit, text in (("x", "m", "position"), ("v", "m/s", "velocity"))),
     *(Column(f"command_{name}", "N", f"command of the {name} controller") for name in SIDES),
-    *(Column(f"input_{name}", "N", f"force of controller and outside on the {name} mass") for name in _BODIES),
+    *(Column(f"input_{name}", "N", f"force of controller and outside on the {name} mass") for name in NAMES.values()),
     *(Column(f"impact_{name}", "N", f"impact force of the {name} contact") for name in SIDES),
     Column("V", "J", "the paper's Lyapunov function (16)"),
     Column("V_c", "J", "its continuous repair, twice the energy"),
