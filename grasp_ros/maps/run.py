@@ -40,8 +40,8 @@ def run(
     """Compute what a file does not have yet: a new directory, or the map of the same plan.
 
     `workers` are processes of a Dask cluster that is started for it, 0: threads of this process; `scheduler` is the
-    address of one that exists. `progress` is told the number of rows that are done. Refused: a plan that cannot be run,
-    a file that is something else or cannot be written, workers that die again and again; what is done is kept.
+    address of one that exists. `progress` is told the number of rows that are done. Refused: a file that is something
+    else or cannot be written, workers that die again and again; what is done is kept.
     """
     def work(span: Span, stop: NDArray[np.int64]) -> Chunk:
         return compute(plan.variants(*span), plan.setup, stop)

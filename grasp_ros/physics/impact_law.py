@@ -6,8 +6,8 @@ u > 0 is penetration, u' > 0 approach, H in N/m^1.5, p in s/m. Each function tak
 `exact.impact` compiles the same source for the kernels. `model.impact_force` combines them for any u and u'.
 Another exponent changes powers of w in `exact.contact.series` and `sensitivity.base_series`, TAIL in
 `exact.contact.taylor_step`, a mean slope in `sensitivity.propagate`, scales in `exact.contact.step_unit`, the impulse
-in `domain`, bounds of `lyapunov.reach`, quotients of `methods.discrete_gradient`, and the key of H, its unit and texts in
-`scene.effects.contact` and `scene.parameter`. Tests: docs/oracles.md.
+in `domain`, bounds of `lyapunov.reach`, quotients of `methods.discrete_gradient`, and the key of H, its unit and texts
+in `scene.effects.contact` and `scene.parameter`. Tests: docs/oracles.md.
 
 References
 ----------
