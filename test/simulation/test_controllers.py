@@ -195,7 +195,7 @@ def test_what_a_controller_raises_passes_through_with_its_tick(compiled: bool) -
         (lambda *_: None, "answered None at tick 0"),
         (lambda *_: np.zeros(1), "answered array"),
         (lambda *_: -math.inf, "answered -inf"),
-        (numba.njit(lambda tick, time, x, v: "much"), "a float as its answer: No conversion from "),
+        (numba.njit(lambda tick, time, x, v: "much"), "float(int, float, float, float): No conversion from "),
         *((law, "too many positional arguments; allowed: a callable of tick, time, x and v")
           for law in (numba.njit(lambda x: x), lambda x: x, math.sin)),
         (lambda tick, time, x, v, more: 0.0, "missing a required argument: 'more'; allowed: a callable of tick"),
