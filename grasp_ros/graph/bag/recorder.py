@@ -158,7 +158,7 @@ class Recorder:
         """End the chunk; close the bag while there is room for its end."""
         if not self._waiting:
             return
-        self._messages.flush()
+        self._writer.flush()  # type: ignore[no-untyped-call]
         self._waiting, self._chunks = 0, self._chunks + 1
         index = INDEX_BYTES * self._chunks
         try:
@@ -232,7 +232,7 @@ class Recorder:
         """Write what was lost, the index, and the metadata."""
         self._closed = True
         self._sink.release()
-        counts = {topic: self._messages.counts[channel] for topic, channel in self._channels.items()}
+        counts = {topic: self._messages.counts.get(channel, 0) for topic, channel in self._channels.items()}
         document = rosbag2.metadata(f"{self._path.name}.mcap", counts, self._names, self._last_ns, self._custom)
         text = dump(document)
         lost = {"end": why, "ticks that are missing": self.gaps or "none", WRITTEN: str(sum(counts.values())),
