@@ -20,7 +20,7 @@ from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_s
 from grasp_ros.cli.bags import add_limits, check_limits, keeps
 from grasp_ros.cli.checks import load_scene, prepare
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
-from grasp_ros.graph.bag.errors import BagError, EmptyBagError
+from grasp_ros.graph.bag import BagError, EmptyBagError
 from grasp_ros.graph.host import check_reach, hold, network
 from grasp_ros.graph.parameters import PEER_SECONDS, quoted
 from grasp_ros.graph.processes import Graph, GraphError, become
@@ -125,17 +125,20 @@ def _run(options: argparse.Namespace) -> int:
     )
     try:
         stopped = _live(graph, spent)
-        if not stopped or _has_begun(graph.bag):
+        if stopped and graph.bag.exists() and not (graph.bag / "metadata.yaml").exists():
+            raise GraphError(f"{graph.bag}: was not closed")  # the monitor has said why, or was killed
+        if not stopped or _has_ticks(graph.bag):
             return _report(graph, stopped, spent, options)
     except (GraphError, BagError) as error:
-        print(f"grasp: {error}{_what_is_there(graph.bag)}", file=sys.stderr)
+        there = f"; {graph.bag} has what was recorded" if _has_ticks(graph.bag) else ""
+        print(f"grasp: {error}{there}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         on_signals(signal.SIG_IGN)  # a second one would cut the sentence short
-        raise KeyboardInterrupt("" if _is_without_ticks(graph.bag) else f"; {graph.bag} was not checked to the end and"
-                                " not drawn; `grasp verify` and `grasp plot` do that") from None
+        raise KeyboardInterrupt(f"; {graph.bag} was not checked to the end and not drawn; `grasp verify` and"
+                                " `grasp plot` do that" if _has_ticks(graph.bag) else "") from None
     except Refused:
-        if graph.processes and _is_without_ticks(graph.bag):  # a node refused what it was given
+        if graph.processes and not _has_ticks(graph.bag):  # a node refused what it was given
             shutil.rmtree(directory, ignore_errors=True)
             if first:
                 directory.parent.rmdir()
@@ -144,32 +147,14 @@ def _run(options: argparse.Namespace) -> int:
     return 130
 
 
-def _has_begun(path: Path) -> bool:
-    """Whether there is a bag with a state, that was closed."""
-    if path.exists() and not (path / "metadata.yaml").exists():  # the monitor has said why, or was killed
-        raise GraphError(f"{path}: was not closed")
-    return _has_ticks(path)
-
-
-def _has_ticks(path: Path) -> bool:
-    """Whether there is a bag with a state: a run that waits for a controller from elsewhere has one without."""
+def _has_ticks(bag: Path) -> bool:
+    """Whether there is a bag to keep: with a state, which a run that waited to its end has not, or unreadable."""
     from grasp_ros.graph.bag.opening import Opened
 
-    messages = Opened(path).messages if path.exists() else ()
-    return any(topic == JOINT_STATES for topic, _ in messages)
-
-
-def _is_without_ticks(bag: Path) -> bool:
-    """Whether there is nothing to keep; a bag that cannot be read may have ticks."""
     try:
-        return not _has_ticks(bag)
+        return bag.exists() and any(topic == JOINT_STATES for topic, _ in Opened(bag).messages)
     except Refused as error:
-        return isinstance(error, EmptyBagError)
-
-
-def _what_is_there(bag: Path) -> str:
-    """What a run that failed has left, as the end of a sentence."""
-    return "" if _is_without_ticks(bag) else f"; {bag} has what was recorded"
+        return not isinstance(error, EmptyBagError)
 
 
 def _in_words(spent: Sequence[tuple[float, str]]) -> str:
@@ -248,8 +233,8 @@ def _watch(options: argparse.Namespace) -> int:
         become("watch", {}, options.namespace)
     if options.namespace != "/" or options.network:
         raise Refused("--namespace and --network are of a graph; allowed: without a bag")
-    from grasp_ros.cli.watch import play
     from grasp_ros.graph.bag.reading import read
+    from grasp_ros.graph.terminal import play
 
     play(read(options.bag), 1.0 if options.rate is None else options.rate, options.first)
     return 0

@@ -27,10 +27,9 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from grasp_ros import scene as scenes
-from grasp_ros.cli.watch import HINT, moment_of
 from grasp_ros.graph import bag
 from grasp_ros.graph.processes import Graph
-from grasp_ros.graph.terminal import View
+from grasp_ros.graph.terminal import HINT, View, moment_of
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.scene.topics import JOINT_STATES
 from grasp_ros.simulation import simulate

@@ -15,7 +15,7 @@ from mcap.opcode import Opcode
 from mcap.records import ChunkIndex, MessageIndex
 from mcap.writer import Writer
 
-from grasp_ros.graph.bag.errors import BagError
+from grasp_ros.graph.bag import BagError
 
 HEAD: struct.Struct = struct.Struct("<BQ")  # opcode and length of every record
 RECORD = struct.Struct("<BQHIQQ")  # the same of a message, its channel, number and both times

@@ -12,7 +12,7 @@ from rosbags.serde import SerdeError
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
-from grasp_ros.graph.bag.errors import BagError, EmptyBagError
+from grasp_ros.graph.bag import BagError, EmptyBagError
 from grasp_ros.graph.bag.recorder import OWN_RECORD, VERSION
 from grasp_ros.graph.bag.rosbag2 import TOPIC, decode, names_of, topics_of
 from grasp_ros.graph.bag.storage import CONVERT, Storage, Stored

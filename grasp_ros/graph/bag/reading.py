@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.graph.bag.errors import BagError, EmptyBagError
+from grasp_ros.graph.bag import BagError, EmptyBagError
 from grasp_ros.graph.bag.opening import UNREADABLE, Opened, decoding_bag
 from grasp_ros.graph.bag.recorder import BESIDE, LOST_RECORD, OWN_RECORD, checksum
 from grasp_ros.graph.bag.recording import Recording, acted_from
@@ -45,7 +45,6 @@ from grasp_ros.scene.topics import (
     timing_names,
 )
 
-__all__ = ["BagError", "Recording", "read"]
 MOST_NS = 2**63 - 1
 LARGEST = 1e100  # of a number: its square is one, too
 NOT_FINITE, PUSHED = f"a number is not finite, or beyond {LARGEST:g}", "an effort of the object; allowed: 0"
@@ -265,6 +264,7 @@ class Changes(dict[int, dict[str, float]]):
         self.unheard: Counter[str] = Counter()
 
     def add(self, topic: Topic, scene: scenes.Scene, stored: Stored) -> None:
+        """Take an announcement."""
         message, tick = decode(topic, stored.cdr), stored.time_ns // scene.period_ns
         if len(message.name) != len(message.position):
             raise BagError(f"{stored.topic}: tick {tick}: {len(message.name)} names of {len(message.position)} numbers")

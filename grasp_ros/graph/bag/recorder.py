@@ -18,10 +18,9 @@ from pathlib import Path
 
 from mcap.writer import CompressionType, IndexType, Writer
 
-from grasp_ros.graph.bag import rosbag2
+from grasp_ros.graph.bag import BagError, rosbag2
 from grasp_ros.graph.bag.chunks import Messages
 from grasp_ros.graph.bag.disk import CHUNK_BYTES, FULL, RESERVE_BYTES, Sink
-from grasp_ros.graph.bag.errors import BagError
 from grasp_ros.graph.running import Running
 from grasp_ros.graph.serialization import clock_template
 from grasp_ros.scene import Scene

@@ -9,7 +9,7 @@ from itertools import chain, groupby
 from pathlib import Path
 from typing import NamedTuple
 
-from grasp_ros.graph.bag.errors import BagError
+from grasp_ros.graph.bag import BagError
 from grasp_ros.graph.bag.opening import UNREADABLE, Opened
 from grasp_ros.graph.bag.reading import MOST_NS, NOT_NEXT, Changes, columns_of, follows, stamp_of
 from grasp_ros.graph.bag.recorder import Recorder

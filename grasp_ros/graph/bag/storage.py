@@ -21,8 +21,8 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Footer, Header, Metadata, Schema
 
+from grasp_ros.graph.bag import BagError
 from grasp_ros.graph.bag.chunks import HEAD
-from grasp_ros.graph.bag.errors import BagError
 from grasp_ros.graph.bag.recorder import DIGEST, LOST_RECORD, OWN_RECORD, signed
 from grasp_ros.graph.bag.rosbag2 import PROFILE
 

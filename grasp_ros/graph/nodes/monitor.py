@@ -18,7 +18,7 @@ from sensor_msgs.msg import JointState
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
-from grasp_ros.graph.bag.errors import BagError
+from grasp_ros.graph.bag import BagError
 from grasp_ros.graph.bag.recorder import NOT_RECORDED, Recorder
 from grasp_ros.graph.health.heartbeat import digest
 from grasp_ros.graph.health.peers import Gone, Need, PeerNode

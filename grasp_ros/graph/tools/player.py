@@ -7,7 +7,7 @@ import time
 from itertools import chain
 from typing import Any
 
-from grasp_ros.graph.bag.errors import EmptyBagError
+from grasp_ros.graph.bag import EmptyBagError
 from grasp_ros.graph.bag.opening import Opened
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase

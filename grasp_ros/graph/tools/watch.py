@@ -28,12 +28,11 @@ from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.messages import StateReader
 from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.graph.serialization import MOST_BYTES, SHORTEST, raw_force, raw_stamp_ns
-from grasp_ros.graph.terminal import Key, Keys, Moment, View
+from grasp_ros.graph.terminal import FRAME_SECONDS, Key, Keys, Moment, View
 from grasp_ros.physics.errors import printable
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.topics import COMMANDS, CONTACTS, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW, Topic, named
 
-FRAME_SECONDS = 0.1
 HINT = "Space pause   → step   q quit"
 STATUS_SECONDS, LOST_SECONDS = 0.5, 2.0  # between questions to the plant, and until an answer is taken to be lost
 PATIENCE_SECONDS = 10.0  # for a plant to come
