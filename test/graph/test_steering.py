@@ -200,7 +200,7 @@ def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
                   f"steps: {10 ** 20} is not allowed", "steps: [1, 'a'] is not allowed",
                   f"steps: [{10 ** 20}] is not allowed",
                   "allowed: a sum >= 0",
-                  "left_feedback.position_gain: left_controller has no such parameter; did you mean " + gain):
+                  "left_feedback.position_gain: no such parameter; did you mean " + gain):
         assert words in err
     assert shell.returncode == 2  # that of the last line, which nobody takes; of one that fails it is 1
 

@@ -129,27 +129,19 @@ class Remote(GraspNode):
 
     def get(self, node: str, *names: str) -> str:
         """Parameters of a node; all of them without names."""
-        known = self._names(node, names)
-        return self._values(node, names or known)
-
-    def _values(self, node: str, names: Sequence[str]) -> str:
-        found = self._ask(GetParameters, f"{node}/get_parameters", GetParameters.Request(names=list(names))).values
+        known = sorted(self._ask(ListParameters, f"{node}/list_parameters", ListParameters.Request()).result.names)
+        for name in names:
+            if name not in known:
+                raise Refused(f"{name}: {node} has no such parameter; {allowed(name, known)}")
+        wanted = [*names] or known
+        found = self._ask(GetParameters, f"{node}/get_parameters", GetParameters.Request(names=wanted)).values
         values = [_plain(parameter_value_to_python(value)) for value in found]
-        return "\n".join(f"{name}: {json.dumps(value)}" for name, value in zip(names, values, strict=False))
+        return "\n".join(f"{name}: {json.dumps(value)}" for name, value in zip(wanted, values, strict=False))
 
     def put(self, node: str, name: str, value: str) -> str:
         """Set a parameter of a node."""
-        self._names(node, [name])
         self._set(node, name, strict_yaml.load(value))
-        return self._values(node, [name])
-
-    def _names(self, node: str, wanted: Sequence[str]) -> list[str]:
-        """All parameters of a node; refuses what is wanted and not among them."""
-        known = sorted(self._ask(ListParameters, f"{node}/list_parameters", ListParameters.Request()).result.names)
-        for name in wanted:
-            if name not in known:
-                raise Refused(f"{name}: {node} has no such parameter; {allowed(name, known)}")
-        return known
+        return self.get(node, name)
 
     def _set(self, node: str, name: str, value: Any) -> None:
         try:
