@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.topics import FRAME, LYAPUNOV_NAMES
+from grasp_ros.scene.topics import CLOCK, FORCE, FRAME, LYAPUNOV, LYAPUNOV_NAMES, Topic
 
 Command = tuple[int, float]  # time in ns of the state that it answers, force in N
 SHORTEST, MOST_BYTES = 16, 4096  # of a message that comes with every state
@@ -99,25 +99,16 @@ class Template:
         return parts[1:3] + parts[4::2] if parts[0] == self._parts[0] and parts[3::2] == self._gaps else None
 
 
-def lyapunov_template() -> Template:
-    """Of what the monitor computes at a tick, see `topics.LYAPUNOV_NAMES`."""
-    return Template(lambda numbers: list_message(0, LYAPUNOV_NAMES, numbers), len(LYAPUNOV_NAMES))
-
-
-def clock_template() -> Template:
-    """Of simulated times."""
-    return Template(lambda _: _HEAD + _STAMP.pack(0, 0), 0)
-
-
-def state_template(names: Sequence[str]) -> Template:
-    """Of the states of some bodies: all positions, all velocities, all input forces."""
+def template_of(topic: Topic, names: Sequence[str] = ()) -> Template:
+    """That of a topic; states of bodies with these names have all positions, all velocities, all input forces."""
+    if topic == CLOCK:
+        return Template(lambda _: _HEAD + _STAMP.pack(0, 0), 0)
+    if topic.type == FORCE:
+        return Template(lambda numbers: force_message(0, *numbers), 1)
+    if topic == LYAPUNOV:
+        return Template(lambda numbers: list_message(0, LYAPUNOV_NAMES, numbers), len(LYAPUNOV_NAMES))
     n = len(names)
     return Template(lambda all: list_message(0, names, all[:n], all[n : 2 * n], all[2 * n :]), 3 * n)
-
-
-def force_template() -> Template:
-    """Of forces along the line, in N."""
-    return Template(lambda numbers: force_message(0, *numbers), 1)
 
 
 def raw_stamp_ns(cdr: bytes) -> int:

@@ -19,22 +19,19 @@ from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.messages import State, StateReader
 from grasp_ros.graph.serialization import (
     Template,
-    clock_template,
-    force_template,
     list_message,
-    lyapunov_template,
     raw_force,
     raw_stamp_ns,
-    state_template,
+    template_of,
 )
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.system import NAMES as BODIES
-from grasp_ros.scene.topics import CLOCK, FORCE, FRAME, LYAPUNOV_NAMES, NAMED_LIST
+from grasp_ros.scene.topics import CLOCK, FORCE, FRAME, JOINT_STATES, LEFT_COMMAND, LYAPUNOV, LYAPUNOV_NAMES, NAMED_LIST
 from lab.drills.nodes import plain_messages
 
 NAMES = ("left", "object", "right")
-TEMPLATE = state_template(NAMES)
+TEMPLATE = template_of(JOINT_STATES, NAMES)
 TIME_NS = 1_234_567_890_123
 STATE, INPUTS = np.array([0.1, -0.0, np.inf, 5e-324, -1e300, 0.6]), np.array([7.0, np.pi, -9.0])
 NUMBERS = st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=9, max_size=9)
@@ -50,10 +47,10 @@ def test_messages_are_those_of_a_library(names: list[str], frame: str) -> None:
         assert list_message(TIME_NS, names, *(part.tolist() for part in lists), frame=frame) == expected
     header.frame_id, zero = FRAME, kind["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0)
     wrench = kind["geometry_msgs/msg/Wrench"](replace(zero, x=-0.1), zero)
-    assert force_template().fill(TIME_NS, [-0.1]) == types.serialize_cdr(kind[FORCE](header, wrench), FORCE)
-    assert clock_template().fill(TIME_NS, ()) == types.serialize_cdr(kind[CLOCK.type](header.stamp), CLOCK.type)
+    assert template_of(LEFT_COMMAND).fill(TIME_NS, [-0.1]) == types.serialize_cdr(kind[FORCE](header, wrench), FORCE)
+    assert template_of(CLOCK).fill(TIME_NS, ()) == types.serialize_cdr(kind[CLOCK.type](header.stamp), CLOCK.type)
     numbers = [math.nan, *range(len(LYAPUNOV_NAMES) - 1)]
-    assert lyapunov_template().fill(TIME_NS, numbers) == list_message(TIME_NS, LYAPUNOV_NAMES, numbers)
+    assert template_of(LYAPUNOV).fill(TIME_NS, numbers) == list_message(TIME_NS, LYAPUNOV_NAMES, numbers)
 
 
 @pytest.mark.parametrize("bodies", [[LEFT, OBJECT, RIGHT], [LEFT, OBJECT], [RIGHT]])
@@ -61,20 +58,20 @@ def test_states_are_those_of_the_message(bodies: list[int]) -> None:
     x, v = STATE[[0, 2, 4]], STATE[[1, 3, 5]]
     place = {LEFT: 0, OBJECT: 1, RIGHT: 2}
     numbers = [float(values[place[body]]) for values in (x, v) for body in bodies] + [float(INPUTS[b]) for b in bodies]
-    template = state_template([BODIES[body] for body in bodies])
+    template = template_of(JOINT_STATES, [BODIES[body] for body in bodies])
     template.fill(7, [0.0] * len(numbers))  # leaves nothing behind
     found = deserialize_message(template.fill(TIME_NS, numbers), JointState)
     assert found == plain_messages.joint_state(TIME_NS, bodies, STATE, INPUTS)
 
 
 def test_forces_and_clocks_have_their_time_and_number() -> None:
-    cdr = force_template().fill(TIME_NS, [-0.1])
+    cdr = template_of(LEFT_COMMAND).fill(TIME_NS, [-0.1])
     assert (raw_stamp_ns(cdr), raw_force(cdr)) == (TIME_NS, -0.1)
-    assert raw_stamp_ns(clock_template().fill(TIME_NS, ())) == TIME_NS
+    assert raw_stamp_ns(template_of(CLOCK).fill(TIME_NS, ())) == TIME_NS
 
 
 def test_a_wrong_number_of_numbers_is_refused() -> None:
-    refused = {force_template(): 2, lyapunov_template(): 8, clock_template(): 1}
+    refused = {template_of(LEFT_COMMAND): 2, template_of(LYAPUNOV): 8, template_of(CLOCK): 1}
     for template, count in refused.items():
         with pytest.raises(ValueError, match="sequence of size"):
             template.fill(0, [1.0] * count)
@@ -145,9 +142,9 @@ def test_what_is_not_finite_is_refused(number: float, place: int) -> None:
 
 def test_another_set_of_bodies_is_learnt_and_a_missing_one_refused() -> None:
     reader = taught(("left",))
-    other = state_template(("left", "object"))
+    other = template_of(JOINT_STATES, ("left", "object"))
     for k in range(3):
         state, n = reader.read(other.fill(k, [k + 0.5] * 6)), k + 0.5
         assert repr(state) == repr(State(k, [n, n, n, n, math.nan, math.nan], [n, 0.0, n]))
     for names in (("object", "right"), ("left", "left")):
-        assert verdict(reader, state_template(names).fill(1, [1.0] * 6)) is Refused
+        assert verdict(reader, template_of(JOINT_STATES, names).fill(1, [1.0] * 6)) is Refused

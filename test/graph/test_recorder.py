@@ -38,7 +38,7 @@ from grasp_ros.graph.bag.recorder import NOT_RECORDED, RESERVE_BYTES, Recorder
 from grasp_ros.graph.bag.recover import recover
 from grasp_ros.graph.bag.rosbag2 import INFORMATION, decode
 from grasp_ros.graph.bag.storage import DATA_END_BYTES, SUM, Stored
-from grasp_ros.graph.serialization import force_template, lyapunov_template, state_template
+from grasp_ros.graph.serialization import template_of
 from grasp_ros.scene.topics import COMMANDS, CONTACTS, DIAGNOSTICS, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES
 from grasp_ros.simulation import Trajectory, simulate
 from lab.drills import recorder as study
@@ -219,13 +219,13 @@ def test_a_second_bag_behind_the_first_is_named(tmp_path: Path, closed: Path, ru
 
 def test_numbers_of_another_make_go_by_their_names_and_stand_alone(run: Trajectory) -> None:
     column, numbers = Columns("/lyapunov", LYAPUNOV, run.scene), [float(k) for k in range(len(LYAPUNOV_NAMES))]
-    message, store = decode(LYAPUNOV, lyapunov_template().fill(0, numbers)), get_typestore(Stores.ROS2_JAZZY)
+    message, store = decode(LYAPUNOV, template_of(LYAPUNOV).fill(0, numbers)), get_typestore(Stores.ROS2_JAZZY)
     message = replace(message, name=message.name[::-1], position=message.position[::-1].copy())
     assert column.numbers(store.serialize_cdr(message, LYAPUNOV.type))[2:] == numbers
     message.name[0] = "vigour"
     with pytest.raises(bag.BagError, match=r"/lyapunov: vigour, .*; allowed: V, "):
         column.numbers(store.serialize_cdr(message, LYAPUNOV.type))
-    pushed = decode(CONTACTS["left"], force_template().fill(0, (2.0,)))
+    pushed = decode(CONTACTS["left"], template_of(CONTACTS["left"]).fill(0, (2.0,)))
     pushed.wrench.force.y = 3.0
     with pytest.raises(bag.BagError, match=r"contact/left: a force or torque beside force\.x; allowed: 0"):
         Columns("contact/left", CONTACTS["left"], run.scene).numbers(store.serialize_cdr(pushed, CONTACTS["left"].type))
@@ -236,7 +236,7 @@ def test_numbers_of_another_make_go_by_their_names_and_stand_alone(run: Trajecto
 def test_stamps_are_whole_numbers_after_104_days() -> None:
     """2^53 ns, from where on floating-point numbers have not every one."""
     scene = scenes.load("arm_alone", ["time.control_period_s=999.000000001", "time.duration_s=9990000.00001"])
-    column, template = Columns("/joint_states", JOINT_STATES, scene), state_template(["left"])
+    column, template = Columns("/joint_states", JOINT_STATES, scene), template_of(JOINT_STATES, ["left"])
     times = [tick * scene.period_ns for tick in range(9010, 9020)]
     for time_ns in times:
         column.add(Stored("", "", time_ns, template.fill(time_ns, (0.1, 0.0, 0.0))))

@@ -23,7 +23,7 @@ from grasp_ros.graph.bag.recorder import BESIDE, LOST_RECORD, OWN_RECORD, checks
 from grasp_ros.graph.bag.recording import Recording, acted_from
 from grasp_ros.graph.bag.rosbag2 import decode
 from grasp_ros.graph.bag.storage import Storage, Stored
-from grasp_ros.graph.serialization import clock_template, force_template, lyapunov_template, state_template
+from grasp_ros.graph.serialization import template_of
 from grasp_ros.physics.layout import OBJECT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -187,8 +187,7 @@ class Columns:
         self._name, self._topic = name, topic
         self._period_ns, self._end_ns = scene.period_ns, scene.ticks * scene.period_ns
         self.names = [NAMES[body] for body in scene.system.present]
-        self._template = (state_template(self.names) if topic == JOINT_STATES else lyapunov_template()
-                          if topic == LYAPUNOV else clock_template() if topic == CLOCK else force_template())
+        self._template = template_of(topic, self.names)
         self.times, self._rows = array("Q"), array("d")
 
     def add(self, stored: Stored) -> None:

@@ -22,7 +22,7 @@ from grasp_ros.graph.bag import BagError, rosbag2
 from grasp_ros.graph.bag.chunks import Messages
 from grasp_ros.graph.bag.disk import CHUNK_BYTES, FULL, RESERVE_BYTES, Sink
 from grasp_ros.graph.running import Running
-from grasp_ros.graph.serialization import clock_template
+from grasp_ros.graph.serialization import template_of
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import writing
@@ -76,7 +76,7 @@ class Recorder:
         topics = {f"{rosbag2.TOPIC}{topic.name}": name for topic, name in (names or {}).items()}
         self._custom = {"scene": scene.to_yaml(), "run": (running or Running()).to_yaml(), **words, **topics}
         self._names = rosbag2.names_of(scene, self._custom)
-        self._clock = clock_template()
+        self._clock = template_of(CLOCK)
         with writing(path, BagError):
             path.mkdir(parents=True)
             self._sink = Sink(path / f"{path.name}.mcap", path / ".reserve")

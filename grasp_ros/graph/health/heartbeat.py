@@ -145,9 +145,14 @@ class Heartbeats:
         """The heartbeats of some nodes, the last one last."""
         return [beat for beat in self._beats.values() if beat.node in names]
 
+    @property
+    def alive(self) -> list[Heartbeat]:
+        """Those of processes that have not said their last words; asked from any thread."""
+        return [beat for beat in list(self._beats.values()) if not beat.ended]
+
     def quiet(self, names: Sequence[str], limit: float) -> list[str]:
         """Which of these nodes were heard once, but not since a wall time, and had no last words."""
-        heard = {beat.node: beat.heard for beat in self.of(names) if not beat.ended}
+        heard = {beat.node: beat.heard for beat in self.alive}
         return [name for name in dict.fromkeys(names) if heard.get(name, limit) < limit]
 
     def living(self, names: Sequence[str], limit: float) -> list[str]:
@@ -163,33 +168,17 @@ class Heartbeats:
 
     def vouched(self, name: str) -> Heartbeat | None:
         """Who says a text, by its digest; None if nobody does."""
-        return next((beat for beat in self._beats.values() if name in beat.texts and not beat.ended), None)
+        return next((beat for beat in self.alive if name in beat.texts), None)
 
     def frozen(self) -> list[str]:
-        """Nodes of this machine that were stopped and may go on; asked from any thread."""
-        beats = list(self._beats.values())
-        return sorted({beat.node for beat in beats if not beat.ended and beat.state in FROZEN})
+        """Nodes of this machine that were stopped and may go on."""
+        return sorted({beat.node for beat in self.alive if beat.state in FROZEN})
 
     def successor(self, identity: str) -> str:
         """Name of the node in another process that has begun to say texts, while this one is silent; or nothing."""
         limit = time.monotonic() - MISSED * HEARTBEAT_SECONDS
-        own = self._beats.get(identity)
-        if own is not None and not own.ended and own.heard >= limit:
-            return ""
-        others = (beat for beat in self._beats.values() if beat.identity != identity)
-        return next((beat.node for beat in others if beat.texts and not beat.ended and beat.heard >= limit), "")
-
-    def has_ended(self, identity: str) -> bool:
-        """Whether a process has said its last words, or is not known."""
-        return identity not in self._beats or bool(self._beats[identity].ended)
-
-    def confirmed(self, topic: str) -> bool:
-        """Whether somebody else has had a message of a topic."""
-        return any(topic in beat.hears and not beat.ended for beat in self._beats.values())
-
-    def speakers(self) -> bool:
-        """Whether anybody is there who says texts."""
-        return any(beat.texts and not beat.ended for beat in self._beats.values())
+        there = {beat.identity: beat.node for beat in self.alive if beat.texts and beat.heard >= limit}
+        return "" if identity in there else next(iter(there.values()), "")
 
 
 def _parsed(text: str) -> Heartbeat | None:

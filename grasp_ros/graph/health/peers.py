@@ -150,14 +150,12 @@ class PeerNode(GraspNode):
             return Trouble(words + "".join(f": {why}" for why in said[-1:] if why != ENDED), True)
         self._gone.pop(need.topic, None)
         self._last[need.topic] = names
-        patience = self.patience
-        if self._excused < now - patience and (quiet := self.heartbeats.quiet(names, now - patience)):
-            if any(beat.runs for beat in self.heartbeats.of(quiet)):  # on this machine, and busy or without its turn
-                patience *= SLOW
-                quiet = self.heartbeats.quiet(names, now - patience) if self._excused < now - patience else []
-            if quiet:
-                words = f"{need.topic.name}: no heartbeat of {' and '.join(quiet)} for {patience:g} s"
-                return Trouble(words, True)
+        patience, quiet = self.patience, self._quiet(names, now - self.patience)
+        if any(beat.runs for beat in self.heartbeats.of(quiet)):  # on this machine, and busy or without its turn
+            patience *= SLOW
+            quiet = self._quiet(names, now - patience)
+        if quiet:
+            return Trouble(f"{need.topic.name}: no heartbeat of {' and '.join(quiet)} for {patience:g} s", True)
         late = now - max(need.due, self._excused)
         if late > self.patience:
             living = bool(self.heartbeats.of(names))  # it may be slow, or compile for its first answer
@@ -165,6 +163,10 @@ class PeerNode(GraspNode):
             words = f"{need.topic.name}: no {need.what} of {' and '.join(names)} for {min(late, limit):.1f} s"
             return Trouble(f"{words}, only heartbeats" if living else words, late > limit)
         return None
+
+    def _quiet(self, names: list[str], limit: float) -> list[str]:
+        """Which nodes have sent no heartbeat since a wall time, if this process itself was there meanwhile."""
+        return self.heartbeats.quiet(names, limit) if self._excused < limit else []
 
     def _note(self, need: Need, trouble: Trouble | None, now: float) -> None:
         """React to what is wrong with a topic, or to its end."""
@@ -225,15 +227,18 @@ class PeerNode(GraspNode):
                 if beat is None and now - when < self.patience:
                     continue
                 texts.remove(entry)
-                if beat is None and (self.heartbeats.speakers() or not self._is_plant(self.sources(topic))):
+                if beat is None and not self._is_foreign(topic):
                     self.refuse("refused texts", topic)
                 elif (known := (name, beat.identity if beat else "")) != self._taken.get(topic) or beat is None:
                     self._taken[topic] = known
                     self._takers[topic](text)
 
-    def _is_plant(self, names: list[str]) -> bool:
-        """Whether nodes that give no sign of life may be a plant of another make."""
-        return bool(names) and set(names) <= set(self.sources(JOINT_STATES))
+    def _is_foreign(self, topic: Topic) -> bool:
+        """Whether a text may be that of a plant of another make: nobody vouches for any, and states come from there."""
+        names = set(self.sources(topic))
+        return bool(names) and names <= {*self.sources(JOINT_STATES)} and not any(
+            beat.texts for beat in self.heartbeats.alive
+        )
 
     def destroy_node(self) -> None:
         """Say last words before."""

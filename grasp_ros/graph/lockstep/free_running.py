@@ -120,8 +120,8 @@ class FreeRunning:
     @property
     def _heard(self) -> bool:
         """Whether the monitor has had commands of all: DDS may connect a controller with it seconds after the plant."""
-        confirmed, topics = self._plant.heartbeats.confirmed, self._plant.scene.controllers.values()
-        return not self._plant.monitored or all(confirmed(topic.name) for topic in topics)
+        heard = {name for beat in self._plant.heartbeats.alive for name in beat.hears}
+        return not self._plant.monitored or heard >= {topic.name for topic in self._plant.scene.controllers.values()}
 
     def advance(self) -> None:
         """Compute the periods that are over."""

@@ -16,7 +16,7 @@ from grasp_ros.graph.health.peers import Gone, Need, PeerNode
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.messages import State, StateReader
 from grasp_ros.graph.ros.node import Phase
-from grasp_ros.graph.serialization import force_template, numbers_message
+from grasp_ros.graph.serialization import numbers_message, template_of
 from grasp_ros.physics.control import command_of, limited
 from grasp_ros.physics.errors import Refused, described
 from grasp_ros.physics.observation import Observation, asked, check
@@ -50,7 +50,8 @@ class Controller(PeerNode):
         self._monitored = self.read_only("wait_for_monitor")
         law = self.read_only("law")
         self._own = OwnLaw(law) if law else None
-        self._commands, self._force_template = self.publisher(COMMANDS[self._side]), force_template()
+        topic = COMMANDS[self._side]
+        self._commands, self._template = self.publisher(topic), template_of(topic)
         self._announcements = self.publisher(CHANGES[self._side])
         self._scene: Scene | None = None
         self._staged: dict[str, float] = {}
@@ -142,7 +143,7 @@ class Controller(PeerNode):
         self.phase = Phase.RUNNING
         self.words = f"running with {self._own.words}" if self._own else "running"
         if not self.begun:  # this tells the plant that the controller is ready, so it comes last
-            self._states = self.subscribe(JOINT_STATES, self._on_state, read=lambda cdr: self._reader.read(cdr))
+            self._states = self.subscribe(JOINT_STATES, self._on_state, raw=True)
         self.begun, self._ready_to_answer, self.concern = True, True, ""
 
     def _begin(self, time_ns: int) -> None:
@@ -162,18 +163,23 @@ class Controller(PeerNode):
             if not self._announcements.wait_for_all_acked(Duration(seconds=ANNOUNCE_SECONDS)):
                 self.get_logger().warning(f"{CHANGES[self._side].name}: a subscriber did not acknowledge a change")
 
-    def _admits(self, time_ns: int) -> bool:
-        """Whether a state can be one of this run."""
+    def _read(self, cdr: bytes) -> State | None:
+        """A state that can be one of this run; None for any other."""
         assert self._scene is not None
-        period_ns, ticks = self._scene.period_ns, self._scene.ticks
-        if time_ns % period_ns == 0 and (time_ns == 0 or self._answered <= time_ns <= ticks * period_ns):
-            return True
+        try:
+            state, period_ns = self._reader.read(cdr), self._scene.period_ns
+        except messages.UNREADABLE:
+            self.refuse("malformed messages", JOINT_STATES)
+            return None
+        known = state.time_ns == 0 or self._answered <= state.time_ns <= self._scene.ticks * period_ns
+        if known and state.time_ns % period_ns == 0:
+            return state
         self.refuse("refused states", JOINT_STATES)
-        return False
+        return None
 
-    def _on_state(self, state: State) -> None:
+    def _on_state(self, cdr: bytes) -> None:
         # A plant that has just come may be sooner than its scene, or than what listens to this node; it asks again.
-        if not self._ready_to_answer or self._scene is None or not self._admits(state.time_ns):
+        if not self._ready_to_answer or self._scene is None or (state := self._read(cdr)) is None:
             return
         if self._free:
             state = self._newest(state)
@@ -204,12 +210,7 @@ class Controller(PeerNode):
     def _newest(self, state: State) -> State:
         """The last state that waits here, or the first after a reset."""
         for cdr in self.waiting(self._states):
-            try:
-                newer = self._reader.read(cdr)
-            except messages.UNREADABLE:
-                self.refuse("malformed messages", JOINT_STATES)
-                continue
-            if not self._admits(newer.time_ns):
+            if (newer := self._read(cdr)) is None:
                 continue
             before, state = state, newer
             self.count("skipped states")
@@ -219,7 +220,7 @@ class Controller(PeerNode):
         return state
 
     def _answer(self, time_ns: int) -> None:
-        self._commands.publish(self._force_template.fill(time_ns, (self._force,)))
+        self._commands.publish(self._template.fill(time_ns, (self._force,)))
 
 
 class OwnLaw:

@@ -29,7 +29,7 @@ from grasp_ros.graph.nodes.picture import Picture
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.running import Running
-from grasp_ros.graph.serialization import lyapunov_template
+from grasp_ros.graph.serialization import template_of
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
@@ -92,7 +92,7 @@ class Monitor(PeerNode):
             "alarms": 0, "ticks without V": 0, NOT_RECORDED: 0, DIAGNOSTICS_LEFT_OUT: 0, "restored commands": 0,
             **{arrival.value: 0 for arrival in Arrival if arrival is not Arrival.TAKEN},
         })
-        self._output, self._template = self.publisher(LYAPUNOV), lyapunov_template()
+        self._output, self._template = self.publisher(LYAPUNOV), template_of(LYAPUNOV)
         self.on_text(RUN, self._on_run)
         self.on_text(SCENE, self._on_scene)
 
@@ -262,7 +262,7 @@ class Monitor(PeerNode):
                 return
 
     def _is_over(self) -> bool:
-        return self._at_end and self.heartbeats.has_ended(self._plant)
+        return self._at_end and all(beat.identity != self._plant for beat in self.heartbeats.alive)
 
     def _heed(self, tick: Tick, values: Mapping[str, float]) -> None:
         """Say why V is not there; end where energy comes from nowhere."""

@@ -24,7 +24,7 @@ from grasp_ros.graph.lockstep.steering import Steering
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.running import Running, check_factor
-from grasp_ros.graph.serialization import SHORTEST, clock_template, force_template, raw_stamp_ns, state_template
+from grasp_ros.graph.serialization import SHORTEST, raw_stamp_ns, template_of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW
@@ -53,8 +53,8 @@ class Plant(PeerNode):
         for warning in self.scene.warnings:
             self.get_logger().warning(warning)
         self._plant = self._new_plant()
-        self._state_template = state_template([NAMES[body] for body in self.scene.system.present])
-        self._clock_template, self._force_template = clock_template(), force_template()
+        self._state_template = template_of(JOINT_STATES, [NAMES[body] for body in self.scene.system.present])
+        self._clock_template = template_of(CLOCK)
         self.resets, self.asked = 0, math.inf  # how often it was put back; wall time of the current state
         self._recorded, self.heard_of_record = -1, -math.inf  # last tick that the monitor has; wall time of its word
         self._begin = math.nan  # wall time of the first state
@@ -64,7 +64,8 @@ class Plant(PeerNode):
             total=self.scene.ticks, unit="tick", desc=self.scene.name, disable=None if progress else True
         )
         self._states = self.publisher(JOINT_STATES)
-        self._forces = [(self.publisher(output.topic), output.value) for output in self.scene.outputs]
+        self._forces = [(self.publisher(output.topic), template_of(output.topic), output.value)
+                        for output in self.scene.outputs]
         self._simulated = self.publisher(CLOCK)
         self._descriptions = [self.publisher(RUN), self.publisher(SCENE)]
         texts = [running.to_yaml(), self.scene.to_yaml()]
@@ -148,7 +149,7 @@ class Plant(PeerNode):
         """Fail if there is another plant; before the start, names of those that are silent: they may be dead."""
         names = self.sources(JOINT_STATES)
         limit = time.monotonic() - self.patience
-        alive = any(not beat.ended and beat.heard >= limit for beat in self.heartbeats.of(names))
+        alive = any(beat.node in names and beat.heard >= limit for beat in self.heartbeats.alive)
         strange = self.living(JOINT_STATES) if len(names) > 1 else []
         if alive or (self.begun and len(strange) > 1):
             topic = self._states.topic_name
@@ -174,7 +175,7 @@ class Plant(PeerNode):
         known = all(publisher.get_subscription_count() >= len(self.readers(publisher))
                     and publisher.wait_for_all_acked(NO_TIME) for publisher in told)
         return not missing and known and self.linked(self._states, [*self.loop.topics, *monitor]) and all(
-            self.linked(publisher, monitor) for publisher, _ in self._forces
+            self.linked(publisher, monitor) for publisher, _, _ in self._forces
         )
 
     def _start(self) -> None:
@@ -198,8 +199,8 @@ class Plant(PeerNode):
         x, v = ([numbers[COLUMN[body] + place] for body in present] for place in (0, 1))
         self._simulated.publish(self._clock_template.fill(time_ns, ()))
         self._states.publish(self._state_template.fill(time_ns, [*x, *v, *(effort[body] for body in present)]))
-        for publisher, value in self._forces:  # while the controllers answer the state
-            publisher.publish(self._force_template.fill(time_ns, (value(self.scene.system, tick, state),)))
+        for publisher, template, value in self._forces:  # while the controllers answer the state
+            publisher.publish(template.fill(time_ns, (value(self.scene.system, tick, state),)))
 
     def advance(self) -> None:
         """Do what its loop finds due."""
@@ -242,4 +243,4 @@ class Plant(PeerNode):
         with suppress(OSError):
             self._bar.close()
         if self.finished and not self.exit_code:
-            self.flush(self._states, *(publisher for publisher, _ in self._forces))
+            self.flush(self._states, *(publisher for publisher, _, _ in self._forces))

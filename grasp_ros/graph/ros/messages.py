@@ -23,12 +23,12 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
-from grasp_ros.graph.serialization import Template, state_template
+from grasp_ros.graph.serialization import Template, template_of
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.system import BODIES, NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.parameter import Parameter
-from grasp_ros.scene.topics import SCENE, Topic
+from grasp_ros.scene.topics import JOINT_STATES, SCENE, Topic
 
 TYPES = {
     "sensor_msgs/msg/JointState": JointState,
@@ -156,7 +156,7 @@ class StateReader:
         ):
             raise Refused(f"no state of {', '.join(self._needed)}: {', '.join(name)}")
         if name != self._name or self._template is None:
-            self._name, self._template, n = name, state_template(name), len(name)
+            self._name, self._template, n = name, template_of(JOINT_STATES, name), len(name)
             at = {body: name.index(word) if word in name else None for body, word in NAMES.items()}
             kinds = [(body, kind) for body in BODIES for kind in (0, 1)] + [(body, 2) for body in sorted(BODIES)]
             self._places = [-1 - (kind == 2) if (i := at[body]) is None else kind * n + i for body, kind in kinds]

@@ -77,21 +77,17 @@ class GraspNode(ParameterNode):
         """Create the publisher of a topic of the graph."""
         return self.create_publisher(messages.TYPES[topic.type], topic.name, messages.qos(topic))
 
-    def subscribe(
-        self, topic: Topic, callback: Callable[[Any], None], raw: bool = False,
-        read: Callable[[bytes], Any] | None = None,
-    ) -> Subscription:
-        """Subscribe to a topic of the graph; raw hands over the serialized bytes, read what it makes of them.
+    def subscribe(self, topic: Topic, callback: Callable[[Any], None], raw: bool = False) -> Subscription:
+        """Subscribe to a topic of the graph; raw hands over the serialized bytes.
 
         What cannot be decoded is refused here: the executor would raise.
         """
         self.inputs.append(topic)
         kind = messages.TYPES[topic.type]
-        read = read or partial(deserialize_message, message_type=kind)
 
         def decode(cdr: bytes) -> None:
             try:
-                message = read(cdr)
+                message = deserialize_message(cdr, kind)
             except messages.UNREADABLE:
                 self.refuse("malformed messages", topic)
                 return
