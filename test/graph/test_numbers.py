@@ -220,7 +220,7 @@ def test_a_topic_with_another_scene_than_that_of_the_bag_is_refused(tmp_path: Pa
 def test_ticks_that_are_none_are_refused(tmp_path: Path, times: tuple[float, ...]) -> None:
     run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
     _, messages = next(study.ticks_of(run))
-    written(tmp_path / "bag", run.scene, [(round(time * run.scene.period_ns), messages) for time in times])
+    written(tmp_path / "bag", run.scene, [(round(time * run.scene.period_ns), messages, 0) for time in times])
     wrong = round(times[-1] * run.scene.period_ns)
     with pytest.raises(bag.BagError, match=f": {wrong} ns; allowed: ticks of the scene in their order"):
         bag.read(tmp_path / "bag")

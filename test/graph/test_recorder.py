@@ -33,11 +33,12 @@ from rosbags.typesys import Stores, get_typestore
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.chunks import HEAD, Messages
-from grasp_ros.graph.bag.reading import Columns
+from grasp_ros.graph.bag.opening import Opened
+from grasp_ros.graph.bag.reading import Ticks
 from grasp_ros.graph.bag.recorder import NOT_RECORDED, RESERVE_BYTES, Recorder
 from grasp_ros.graph.bag.recover import recover
 from grasp_ros.graph.bag.rosbag2 import INFORMATION, decode
-from grasp_ros.graph.bag.storage import DATA_END_BYTES, SUM, Stored
+from grasp_ros.graph.bag.storage import DATA_END_BYTES, SUM
 from grasp_ros.graph.serialization import template_of
 from grasp_ros.scene.topics import COMMANDS, CONTACTS, DIAGNOSTICS, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES
 from grasp_ros.simulation import Trajectory, simulate
@@ -217,30 +218,30 @@ def test_a_second_bag_behind_the_first_is_named(tmp_path: Path, closed: Path, ru
     assert found.ticks == len(run.t)
 
 
-def test_numbers_of_another_make_go_by_their_names_and_stand_alone(run: Trajectory) -> None:
-    column, numbers = Columns("/lyapunov", LYAPUNOV, run.scene), [float(k) for k in range(len(LYAPUNOV_NAMES))]
+def test_numbers_of_another_make_go_by_their_names_and_stand_alone(closed: Path, run: Trajectory) -> None:
+    reader, numbers = Ticks(Opened(closed)), [float(k) for k in range(len(LYAPUNOV_NAMES))]
     message, store = decode(LYAPUNOV, template_of(LYAPUNOV).fill(0, numbers)), get_typestore(Stores.ROS2_JAZZY)
     message = replace(message, name=message.name[::-1], position=message.position[::-1].copy())
-    assert column.numbers(store.serialize_cdr(message, LYAPUNOV.type))[2:] == numbers
+    assert reader.numbers(LYAPUNOV, store.serialize_cdr(message, LYAPUNOV.type))[2:] == numbers
     message.name[0] = "vigour"
     with pytest.raises(bag.BagError, match=r"/lyapunov: vigour, .*; allowed: V, "):
-        column.numbers(store.serialize_cdr(message, LYAPUNOV.type))
+        reader.numbers(LYAPUNOV, store.serialize_cdr(message, LYAPUNOV.type))
     pushed = decode(CONTACTS["left"], template_of(CONTACTS["left"]).fill(0, (2.0,)))
     pushed.wrench.force.y = 3.0
     with pytest.raises(bag.BagError, match=r"contact/left: a force or torque beside force\.x; allowed: 0"):
-        Columns("contact/left", CONTACTS["left"], run.scene).numbers(store.serialize_cdr(pushed, CONTACTS["left"].type))
-    command = Columns("left/effort_command", COMMANDS["left"], run.scene)  # of a stranger, who may send what he likes
-    assert command.numbers(store.serialize_cdr(pushed, COMMANDS["left"].type)) == [0, 0, 2.0]
+        reader.numbers(CONTACTS["left"], store.serialize_cdr(pushed, CONTACTS["left"].type))
+    foreign = store.serialize_cdr(pushed, COMMANDS["left"].type)  # a command of a stranger, who may send what he likes
+    assert reader.numbers(COMMANDS["left"], foreign) == [0, 0, 2.0]
 
 
-def test_stamps_are_whole_numbers_after_104_days() -> None:
+def test_stamps_are_whole_numbers_after_104_days(tmp_path: Path) -> None:
     """2^53 ns, from where on floating-point numbers have not every one."""
     scene = scenes.load("arm_alone", ["time.control_period_s=999.000000001", "time.duration_s=9990000.00001"])
-    column, template = Columns("/joint_states", JOINT_STATES, scene), template_of(JOINT_STATES, ["left"])
-    times = [tick * scene.period_ns for tick in range(9010, 9020)]
-    for time_ns in times:
-        column.add(Stored("", "", time_ns, template.fill(time_ns, (0.1, 0.0, 0.0))))
-    assert column.of()[2].tolist() == times
+    written(tmp_path / "bag", scene, [])
+    reader, template = Ticks(Opened(tmp_path / "bag")), template_of(JOINT_STATES, ["left"])
+    for time_ns in [tick * scene.period_ns for tick in range(9010, 9020)]:
+        reader.row(time_ns, {JOINT_STATES: template.fill(time_ns, (0.1, 0.0, 0.0))})
+        assert reader.stamp_ns == time_ns
 
 
 def test_ticks_that_are_missing_are_named_in_the_bag(tmp_path: Path, run: Trajectory) -> None:

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import chain, groupby
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
 from grasp_ros.graph.bag import BagError
 from grasp_ros.graph.bag.opening import UNREADABLE, Opened
-from grasp_ros.graph.bag.reading import MOST_NS, NOT_NEXT, Changes, columns_of, follows, stamp_of
+from grasp_ros.graph.bag.reading import Changes, Ticks, ticks_of
 from grasp_ros.graph.bag.recorder import Recorder
 from grasp_ros.scene.topics import CHANGES, CLOCK, LYAPUNOV, RUN, SCENE, Topic
 
 MOST_REASONS = 20  # that are told apart
+TICK = re.compile(r"\btick \d+: ")  # which is noted beside the reason
 
 
 class Recovery(NamedTuple):
@@ -62,7 +64,7 @@ def _noting(refused: dict[str, list[int]], tick: int) -> Iterator[None]:
     try:
         yield
     except UNREADABLE as error:
-        why = " ".join(str(error).split())
+        why = TICK.sub("", " ".join(str(error).split()))
         refused.setdefault(why if len(refused) < MOST_REASONS else "other reasons", []).append(tick)
 
 
@@ -73,31 +75,21 @@ def _ticks(
 
     Those that no reader would take are left out, and noted.
     """
-    columns, scene, changes = columns_of(opened), opened.scene, Changes()
-    period_ns, wanted = scene.period_ns, columns.keys() - {CLOCK}
-    before, at = -1, (0, 0)  # time of the last tick; the same and its stamp, from which the first one counts
-    for time_ns, group in groupby(opened.messages, lambda message: message[1].time_ns):
-        tick: dict[Topic, bytes] = {}
-        beside, number, stamp_ns = [], time_ns // period_ns, -1
-        for topic, stored in group:
-            if topic in wanted:
-                tick[topic] = stored.cdr
-            elif topic in CHANGES.values():
-                with _noting(refused, number):
-                    changes.add(topic, scene, stored)
-                    tick[topic] = stored.cdr
-            elif topic not in (SCENE, RUN, CLOCK):  # these three the recorder writes itself
-                beside.append((topic, stored.cdr))
-        if time_ns % period_ns or not before < time_ns <= MOST_NS:
+    reader, scene, changes = Ticks(opened), opened.scene, Changes()
+    wanted = {*reader.topics} - {CLOCK}
+    for time_ns, tick, others in ticks_of(opened, wanted):
+        number, beside = time_ns // scene.period_ns, []
+        if not tick:
             continue
         with _noting(refused, number):
             if missing := sorted(topic.name for topic in wanted - tick.keys()):
                 raise BagError(f"no message on {', '.join(missing)}")
-            found = stamp_of(columns, tick)
-            none = found % period_ns or not 0 <= found <= scene.ticks * period_ns
-            if none or not follows(found - at[1], time_ns - at[0], period_ns):
-                raise BagError(NOT_NEXT)
-            stamp_ns = found
-        if stamp_ns >= 0:
-            before, at = time_ns, (time_ns, stamp_ns)
-            yield time_ns, stamp_ns, tick, beside
+            reader.row(time_ns, tick)
+            for topic, stored in others:
+                if topic in CHANGES.values():
+                    with _noting(refused, number):
+                        changes.add(topic, scene, stored)
+                        tick[topic] = stored.cdr
+                elif topic not in (SCENE, RUN, CLOCK):  # these three the recorder writes itself
+                    beside.append((topic, stored.cdr))
+            yield time_ns, reader.stamp_ns, tick, beside
