@@ -22,7 +22,7 @@ LOOK_SECONDS = 0.25
 STILL_SECONDS = 1.0  # between two looks: this thread was busy
 GONE_SECONDS = 0.7  # without a source: its last messages are on the way
 SLOW = 4  # times longer who shows that it lives may take
-MOST_TEXTS = 8  # that wait for somebody to vouch for them
+MOST_TEXTS = 8  # of a topic, that wait for somebody to vouch for them
 
 
 class Gone(Enum):
@@ -67,8 +67,8 @@ class PeerNode(GraspNode):
         self._left: tuple[Phase, str] | None = None  # what it did before a peer ended without which it stays
         self._gone: dict[Topic, float] = {}
         self._last: dict[Topic, list[str]] = {}  # names of the last sources
-        self._texts: dict[Topic, list[tuple[float, str]]] = {}
-        self._takers: dict[Topic, Callable[[str], None]] = {}
+        # Texts that wait: since when, on which topic, and who takes them.
+        self._texts: list[tuple[float, Topic, str, Callable[[str], None]]] = []
         self._taken: dict[Topic, tuple[str, str]] = {}  # digest, and who said it
         self.counters.update({"silent peers": 0, "refused texts": 0, "second sources": 0})
         self._watchdog = Watchdog(
@@ -115,7 +115,7 @@ class PeerNode(GraspNode):
             self.sweep()
         self._looked = now
         self._watchdog.seen()
-        self._offer()
+        self.heard()
         if self.finished:
             return
         if (progress := self.progress()) == self._before:
@@ -202,36 +202,29 @@ class PeerNode(GraspNode):
 
     def on_text(self, topic: Topic, take: Callable[[str], None]) -> None:
         """Subscribe to a text; accepted if a living node sends its digest, or if no node sends digests."""
-        self._texts[topic], self._takers[topic] = [], take
-        self.subscribe(topic, partial(self._on_text, topic))
+        self.subscribe(topic, partial(self._on_text, topic, take))
 
-    def _on_text(self, topic: Topic, message: Any) -> None:
-        if len(message.data) > TEXT_BYTES or len(self._texts[topic]) >= MOST_TEXTS:
+    def _on_text(self, topic: Topic, take: Callable[[str], None], message: Any) -> None:
+        if len(message.data) > TEXT_BYTES or sum(own == topic for _, own, *_ in self._texts) >= MOST_TEXTS:
             self.refuse("refused texts", topic)
             return
-        self._texts[topic].append((time.monotonic(), message.data))
-        self._offer()
+        self._texts.append((time.monotonic(), topic, message.data, take))
+        self.heard()
 
     def heard(self) -> None:
-        """Somebody has given a sign of life."""
-        self._offer()
-
-    def _offer(self) -> None:
-        """Take the texts that somebody vouches for, and refuse those that have waited in vain."""
-        now = time.monotonic()
-        for topic, texts in self._texts.items():
-            for entry in tuple(texts):
-                when, text = entry
-                name = digest(text)
-                beat = self.heartbeats.vouched(name)
-                if beat is None and now - when < self.patience:
-                    continue
-                texts.remove(entry)
-                if beat is None and not self._is_foreign(topic):
-                    self.refuse("refused texts", topic)
-                elif (known := (name, beat.identity if beat else "")) != self._taken.get(topic) or beat is None:
-                    self._taken[topic] = known
-                    self._takers[topic](text)
+        """Take the texts that somebody vouches for by now, and refuse those that have waited in vain."""
+        for entry in tuple(self._texts):
+            when, topic, text, take = entry
+            name = digest(text)
+            beat = self.heartbeats.vouched(name)
+            if beat is None and time.monotonic() - when < self.patience:
+                continue
+            self._texts.remove(entry)
+            if beat is None and not self._is_foreign(topic):
+                self.refuse("refused texts", topic)
+            elif (known := (name, beat.identity if beat else "")) != self._taken.get(topic) or beat is None:
+                self._taken[topic] = known
+                take(text)
 
     def _is_foreign(self, topic: Topic) -> bool:
         """Whether a text may be that of a plant of another make: nobody vouches for any, and states come from there."""

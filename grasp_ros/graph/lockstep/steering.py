@@ -64,7 +64,7 @@ class Steering:
         if self._paused is paused and not self.steps:  # a step that goes on is ended by either
             return self._answer(response, f"already {'paused' if paused else 'running'} at tick {self._plant.tick}")
         self._paused, self.steps = paused, 0
-        self._plant.advance()
+        self._plant.loop.advance()
         return self._answer(response)
 
     def _step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -77,7 +77,7 @@ class Steering:
         if wanted > left:
             return self._answer(response, f"steps: {wanted} is not allowed; allowed: at most {left}")
         self.steps, goal = wanted, plant.tick + wanted
-        plant.advance()
+        plant.loop.advance()
         return self._answer(response, goal={"tick": goal, "state": PAUSED})
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -87,7 +87,7 @@ class Steering:
             return self._answer(response, "already at the beginning")
         self.reset_due = True
         number, tick = self._plant.resets + 1, self._plant.tick  # which may be over when `advance` returns
-        self._plant.advance()
+        self._plant.loop.advance()
         return self._answer(response, goal={"resets": number, "resetting": False}, last_tick=tick)
 
     def _answer(self, response: Trigger.Response, why: str = "", **more: Any) -> Trigger.Response:

@@ -117,7 +117,7 @@ class Plant(PeerNode):
             self.refuse("refused records", LYAPUNOV)
             return
         self._recorded, self.heard_of_record = tick, time.monotonic()
-        self.advance()
+        self.loop.advance()
 
     def report(self) -> None:
         """Publish the counters, and see to it that nobody else plays the plant."""
@@ -201,10 +201,6 @@ class Plant(PeerNode):
         self._states.publish(self._state_template.fill(time_ns, [*x, *v, *(effort[body] for body in present)]))
         for publisher, template, value in self._forces:  # while the controllers answer the state
             publisher.publish(template.fill(time_ns, (value(self.scene.system, tick, state),)))
-
-    def advance(self) -> None:
-        """Do what its loop finds due."""
-        self.loop.advance()
 
     def step(self, forces: Array) -> None:
         """Advance one period with the answers (3,) in N by body to the current state; publish the next."""
