@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
 
@@ -27,6 +27,7 @@ from grasp_ros.graph.running import Running, check_factor
 from grasp_ros.graph.serialization import SHORTEST, raw_stamp_ns, template_of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW
 from grasp_ros.simulation.sampled_plant import SampledPlant
 
@@ -48,7 +49,7 @@ class Plant(PeerNode):
         waits = free and self.read_only("wait_for_controllers")
         steering = Steering(self)
         scene = scenes.load(name)
-        running = self._read_running(free, list(scene.controllers.values()))
+        running = self._read_running(scene) if free else Running(self._accuracy)
         self.scene = scene.changed(self.declare_scene(scene, "plant"))
         for warning in self.scene.warnings:
             self.get_logger().warning(warning)
@@ -78,17 +79,12 @@ class Plant(PeerNode):
         self.loop = FreeRunning(self, steering, running, waits) if free else Lockstep(self, steering)
         self.when(self._ready, self._start)
 
-    def _read_running(self, free: bool, topics: Sequence[Any]) -> Running:
-        """How it runs, from its parameters; those of the free-running loop exist only there."""
-        if not free:
-            return Running(self._accuracy)
+    def _read_running(self, scene: Scene) -> Running:
+        """How it runs with the wall clock, from parameters that exist only there."""
         factor = self.read_only("real_time_factor")
         check_factor(factor)
-        timeouts, reactions = {}, {}
-        for topic in topics:
-            side = topic.name.split("/")[0]
-            timeouts[side] = self.read_only(f"{side}_timeout_s")
-            reactions[side] = self.read_only(f"{side}_on_timeout")
+        timeouts, reactions = ({NAMES[body]: self.read_only(f"{NAMES[body]}_{name}") for body in scene.system.laws}
+                               for name in ("timeout_s", "on_timeout"))
         return Running(self._accuracy, factor, timeouts, reactions)
 
     def _new_plant(self) -> SampledPlant:

@@ -126,7 +126,6 @@ class StateReader:
 
     def __init__(self, names: Collection[str]) -> None:
         self._needed = names  # of bodies that every state has
-        self._name: tuple[str, ...] = ()
         self._template: Template | None = None
         self._places: list[int] = []  # of the six numbers and three inputs in a message
 
@@ -155,9 +154,8 @@ class StateReader:
             len({*name}) < len(name)
         ):
             raise Refused(f"no state of {', '.join(self._needed)}: {', '.join(name)}")
-        if name != self._name or self._template is None:
-            self._name, self._template, n = name, template_of(JOINT_STATES, name), len(name)
-            at = {body: name.index(word) if word in name else None for body, word in NAMES.items()}
-            kinds = [(body, kind) for body in BODIES for kind in (0, 1)] + [(body, 2) for body in sorted(BODIES)]
-            self._places = [-1 - (kind == 2) if (i := at[body]) is None else kind * n + i for body, kind in kinds]
+        self._template, n = template_of(JOINT_STATES, name), len(name)
+        at = {body: name.index(word) if word in name else None for body, word in NAMES.items()}
+        kinds = [(body, kind) for body in BODIES for kind in (0, 1)] + [(body, 2) for body in sorted(BODIES)]
+        self._places = [-1 - (kind == 2) if (i := at[body]) is None else kind * n + i for body, kind in kinds]
         return chain((message.header.stamp.sec, message.header.stamp.nanosec), *lists)
