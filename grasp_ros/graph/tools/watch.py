@@ -6,7 +6,8 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable, Set
+from collections import defaultdict
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -37,35 +38,7 @@ HINT = "Space pause   → step   q quit"
 STATUS_SECONDS, LOST_SECONDS = 0.5, 2.0  # between questions to the plant, and until an answer is taken to be lost
 PATIENCE_SECONDS = 10.0  # for a plant to come
 STALE_SECONDS = 1.0  # after a reset: what waits here may still be of the time before it
-MOST_OPEN = WINDOW + 500  # states of which not all has come; a monitor may be WINDOW behind
-
-
-class Newest:
-    """The newest state of which all messages have come; a state that lacks one is left out."""
-
-    def __init__(self) -> None:
-        self.found: dict[Topic, bytes] = {}  # its serialized messages; none before the first
-        self._open: dict[int, dict[Topic, bytes]] = {}
-        self._state, self._stale = -1, 0.0  # stamp of the last one, and until when others are not taken
-
-    def put(self, topic: Topic, cdr: bytes, needed: Set[Topic]) -> None:
-        """Take a message; `needed` is what belongs to a state."""
-        stamp = raw_stamp_ns(cdr)
-        if topic == JOINT_STATES:
-            if stamp < self._state:
-                self._open.clear()
-                self._stale = time.monotonic() + STALE_SECONDS
-            self._state = stamp
-        elif time.monotonic() < self._stale:
-            return
-        there = self._open.setdefault(stamp, {})
-        there[topic] = cdr
-        if there.keys() >= needed:
-            self.found = there
-            for older in [other for other in self._open if other <= stamp]:
-                del self._open[older]
-        elif len(self._open) > MOST_OPEN:
-            del self._open[next(iter(self._open))]
+MOST_SEEN = WINDOW + 500  # messages of a topic; a monitor may be WINDOW behind
 
 
 class Watch(GraspNode):
@@ -74,8 +47,10 @@ class Watch(GraspNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("watch", **options)
         self._view: View | None = None
-        self._newest, self._reader, self._lockstep = Newest(), StateReader(()), True
-        self._needed: set[Topic] = set()
+        self._reader, self._lockstep = StateReader(()), True
+        self._seen: defaultdict[Topic, dict[int, bytes]] = defaultdict(dict)  # the last messages, by their stamps
+        self._found: dict[Topic, bytes] = {}  # those of the newest state of which all have come
+        self._state, self._stale = -1, 0.0  # stamp of the last one, and until when nothing but states is taken
         self._there, self._before, self._rate = time.monotonic(), (time.monotonic(), 0), 0.0  # a plant, at the latest
         where = place(os.environ, self.get_namespace())
         self._nobody = f"no plant has come for {PATIENCE_SECONDS:g} s {where}"
@@ -100,16 +75,29 @@ class Watch(GraspNode):
         self._keys.start()
 
     def _on_scene(self, message: Any) -> None:
-        scene = scenes.parse(message.data, SCENE.name, f"topic {SCENE.name}")
-        self._view = View(scene)
-        self._newest = Newest()
+        self._view = View(scenes.parse(message.data, SCENE.name, f"topic {SCENE.name}"))
+        self._seen.clear()
+        self._found, self._state, self._stale = {}, -1, 0.0
 
     def _on_run(self, message: Any) -> None:
         self._lockstep = runnings.parse(message.data).lockstep
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
-        if SHORTEST <= len(cdr) <= MOST_BYTES and (topic in self._needed or topic == JOINT_STATES):
-            self._newest.put(topic, cdr, self._needed)
+        if not SHORTEST <= len(cdr) <= MOST_BYTES:
+            return
+        stamp, now = raw_stamp_ns(cdr), time.monotonic()
+        if topic == JOINT_STATES:
+            if stamp < self._state:  # the plant was reset
+                self._seen.clear()
+                self._stale = now + STALE_SECONDS
+            self._state = stamp
+        elif now < self._stale:
+            return
+        seen = self._seen[topic]
+        seen.pop(stamp, None)
+        seen[stamp] = cdr  # the newest is the last
+        if len(seen) > MOST_SEEN:
+            del seen[next(iter(seen))]
 
     def _look(self) -> None:
         """Do what keys ask for, and draw."""
@@ -165,11 +153,14 @@ class Watch(GraspNode):
     def _draw(self) -> None:
         held = COMMANDS.values() if self._lockstep else ()  # in a free run they belong to no state of their own
         there = (topic for topic in (LYAPUNOV, *CONTACTS.values(), *held) if self.writers(topic))
-        self._needed = {JOINT_STATES, *there}
+        needed = [self._seen[topic] for topic in (JOINT_STATES, *there)]
+        whole = next((stamp for stamp in reversed(needed[0]) if all(stamp in seen for seen in needed)), None)
+        if whole is not None:
+            self._found = {topic: seen[whole] for topic, seen in self._seen.items() if whole in seen}
         alone = not self.writers(JOINT_STATES)
-        if self._view is not None and self._newest.found:
+        if self._view is not None and self._found:
             with suppress(*messages.UNREADABLE):  # of a sender that says something else
-                moment = self._moment(self._newest.found, alone)
+                moment = self._moment(self._found, alone)
                 self._live.update(self._view.draw(moment, self._live.console.width), refresh=True)
         elif alone and time.monotonic() > self._there + PATIENCE_SECONDS:
             self.fail(self._nobody)
