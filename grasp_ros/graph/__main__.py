@@ -16,9 +16,8 @@ from importlib import import_module
 from itertools import chain, pairwise
 from typing import Any
 
-from grasp_ros.graph.host import check_reach, this_host
+from grasp_ros.graph.host import check_reach, remove_left, this_host
 from grasp_ros.graph.parameters import NODES, PARAMETERS, TOOLS, usage
-from grasp_ros.graph.shared_memory import remove_left
 from grasp_ros.graph.stopping import STOP_SIGNALS, end_late_by_force, end_with_parent, note_signals
 from grasp_ros.physics.errors import Refused
 

@@ -1,4 +1,6 @@
-"""From where a graph can be reached: from this host alone, unless the network is asked for.
+"""The host of a graph: who reaches it there, what it must have, and what killed processes leave in its memory.
+
+A graph is reached from this host alone, unless the network is asked for.
 
 ROS's own setting for that, ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST, only says whom a participant looks for: it still
 listens on every interface, and who names this host as a static peer is let in. So Fast DDS gets a profile, too, whose
@@ -8,12 +10,15 @@ only interface is the loopback one. A participant on this host that has no such 
 from __future__ import annotations
 
 import errno
+import fcntl
 import hashlib
 import os
 import resource
 import socket
 import sys
+import time
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from grasp_ros import CONFIG
@@ -29,6 +34,9 @@ OTHER_WISHES = ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "FASTDDS_DEFAULT_PRO
 MIDDLEWARE, OURS = "RMW_IMPLEMENTATION", "rmw_fastrtps_cpp"  # the one that the profile is for
 LEAST_BYTES = 2**31  # that a node can address: with its libraries and threads it takes up to 1.8e9
 LEAST_FILES = 32  # that a node has open: its libraries, and the sockets of DDS
+SHARED = Path("/dev/shm")  # of Linux; elsewhere there is nothing to find
+LOCK, PREFIX, PORT = "_el", "fastrtps_", "fastrtps_port"  # how Fast DDS names what it has there
+YOUNG_SECONDS = 2.0  # a process may be about to lock what it has just made
 INDEX = "share/ament_index/resource_index/rmw_typesupport"  # where an installation of ROS lists those that it has
 
 
@@ -102,3 +110,17 @@ def _installed(given: Mapping[str, str]) -> list[str]:
     roots = [sys.prefix, *filter(None, given.get("AMENT_PREFIX_PATH", "").split(os.pathsep))]
     names = (file.name for root in roots for file in Path(root, INDEX).glob("rmw_*"))
     return sorted({OURS, *names} - {"rmw_implementation"})
+
+
+def remove_left() -> None:
+    """Remove the segments of shared memory that killed processes have left.
+
+    A segment has a lock file beside it, which its process holds: if it can be had, nobody uses the segment any more.
+    The small segments of ports are left alone: the next process on that port takes them over, perhaps at this moment.
+    """
+    for lock in SHARED.glob(f"{PREFIX}*{LOCK}"):
+        with suppress(OSError), lock.open("rb") as held:
+            if not lock.name.startswith(PORT) and time.time() - lock.stat().st_mtime > YOUNG_SECONDS:
+                fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                lock.with_name(lock.name.removesuffix(LOCK)).unlink(missing_ok=True)
+                lock.unlink()

@@ -16,8 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
 
-from grasp_ros.graph import shared_memory
-from grasp_ros.graph.host import hold
+from grasp_ros.graph.host import hold, remove_left
 from grasp_ros.graph.parameters import PEER_SECONDS, START_SECONDS, check_timeouts, quoted
 from grasp_ros.graph.stopping import GRACE_SECONDS, STOP_SIGNALS
 from grasp_ros.physics.errors import Refused
@@ -72,7 +71,6 @@ class Graph:
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
     begun: float | None = None  # wall time at which the bag was there
     _stopped: dict[str, float] = field(default_factory=dict)  # since when
-    _segments: set[str] = field(default_factory=set)  # of shared memory, that were there before
     # The children read the other end: when this one closes, however that comes, they end. They say there why they end.
     _lifeline: socket.socket | None = None
     _causes: list[tuple[float, str, int]] = field(default_factory=list)  # wall time, what was said then, status
@@ -113,8 +111,7 @@ class Graph:
         environment = {"ROS_LOG_DIR": str(self.directory / "log"), **os.environ, "PYTHONINSPECT": ""}  # none asks on
         # A child inherits the mask and lifts it when its handlers are in place: it cannot be interrupted half started.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
-        shared_memory.remove_left()
-        self._segments = shared_memory.segments()
+        remove_left()
         self._lifeline, end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._lifeline.setblocking(False)
         try:
@@ -252,5 +249,5 @@ class Graph:
         self._lifeline = self._place = None
         statuses = {name: process.returncode for name, process in self.processes.items()}
         if any(status < 0 for status in statuses.values()):  # killed: what it has left is of no use to anybody
-            shared_memory.remove_unused(shared_memory.segments() - self._segments)
+            remove_left()
         return statuses

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from processes import DEADLINE, GRASP, START, children, growing, ran, wait_for
 
-from grasp_ros.graph import bag, shared_memory
+from grasp_ros.graph import bag, host
 from grasp_ros.scene.topics import JOINT_STATES
 
 pytestmark = pytest.mark.slow
@@ -74,20 +74,28 @@ def test_a_terminal_that_is_closed_ends_a_run_cleanly(launch: Any, tmp_path: Pat
     check_bag(tmp_path)
 
 
+def segments() -> set[str]:
+    """Names of the segments of shared memory, but for those of ports."""
+    found = {path.name.removesuffix("_el") for path in host.SHARED.glob("fastrtps_*_el")}
+    return {name for name in found if not name.startswith(host.PORT)}
+
+
 def test_shared_memory_of_a_killed_process_is_removed_and_no_other(launch: Any) -> None:
-    before = shared_memory.segments()
+    before = segments()
     node = launch(*START, "left_controller", stderr=subprocess.DEVNULL)
     maps = Path(f"/proc/{node.pid}/maps")
-    wait_for(lambda: any(name in maps.read_text() for name in shared_memory.segments() - before), "its segment")
-    own = {name for name in shared_memory.segments() - before if name in maps.read_text()}
-    assert not shared_memory.remove_unused(own)
-    node.kill()
-    node.wait(DEADLINE)
+    wait_for(lambda: any(name in maps.read_text() for name in segments() - before), "its segment")
+    own = {name for name in segments() - before if name in maps.read_text()}
     old = time.time() - 60.0
     for name in own:
-        os.utime(shared_memory.DIRECTORY / f"{name}_el", (old, old))  # a young one may be of one who starts
+        os.utime(host.SHARED / f"{name}_el", (old, old))  # a young one may be of one who starts
+    host.remove_left()
+    assert own <= segments()
+    node.kill()
+    node.wait(DEADLINE)
+    assert own <= segments()
     launch(*START, "left_controller", stderr=subprocess.DEVNULL)
-    wait_for(lambda: not own & shared_memory.segments(), "the next one to remove it")
+    wait_for(lambda: not own & segments(), "the next one to remove it")
 
 
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM])
