@@ -66,7 +66,7 @@ class Remote(GraspNode):
         on_signals(stop)
         try:
             if not received:
-                self.exit_code = _say(self, self._wanted) if self._wanted else _shell(self)
+                self.exit_code = self.do(self._wanted) if self._wanted else self.shell()
         except KeyboardInterrupt:
             pass
         except OSError as error:
@@ -78,26 +78,36 @@ class Remote(GraspNode):
             note_signals(received)
         return True
 
-    def do(self, words: Sequence[str]) -> str:
-        """Do what some words ask for; returns what there is to say.
+    def shell(self) -> int:
+        """Do what the lines of the standard input ask for, until it ends; the exit status of the last one."""
+        status, prompt = 0, "grasp> " if sys.stdin.isatty() else ""
+        while True:
+            print(prompt, end="", flush=True)
+            words = sys.stdin.readline()
+            if not words or words.strip() in FAREWELL:
+                return status
+            if words.strip():
+                status = self.do(words.split())
 
-        Raises
-        ------
-        Refused
-            If it is not allowed.
-        Failed
-            If nobody answers, or does it.
-        """
+    def do(self, words: Sequence[str]) -> int:
+        """Do what some words ask for, and print what there is to say; exit status 1 if nobody answers or does it."""
         action = self._actions.get(words[0])
-        wrong = f"{' '.join(words)}: not allowed; allowed: {HELP}"
-        if action is None or "" in words:
-            raise Refused(wrong)
+        wrong = Refused(f"{' '.join(words)}: not allowed; allowed: {HELP}")
         try:
-            signature(action).bind(*words[1:])
-        except TypeError:
-            raise Refused(wrong) from None
-        with refusing():
-            return action(*words[1:])
+            if action is None or "" in words:
+                raise wrong
+            try:
+                signature(action).bind(*words[1:])
+            except TypeError:
+                raise wrong from None
+            with refusing():
+                answer = action(*words[1:])
+            if answer:
+                print(answer, flush=True)
+        except Refused as error:
+            print(error, file=sys.stderr, flush=True)
+            return 1 if isinstance(error, Failed) else 2
+        return 0
 
     def step(self, number: str = "1") -> str:
         """Let a paused plant do some periods."""
@@ -223,25 +233,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value.hex() if isinstance(value, bytes) else value
-
-
-def _shell(remote: Remote) -> int:
-    """Do what the lines of the standard input ask for, until it ends; the status of the last one."""
-    status, prompt = 0, "grasp> " if sys.stdin.isatty() else ""
-    while True:
-        print(prompt, end="", flush=True)
-        words = sys.stdin.readline()
-        if not words or words.strip() in FAREWELL:
-            return status
-        if words.strip():
-            status = _say(remote, words.split())
-
-
-def _say(remote: Remote, words: Sequence[str]) -> int:
-    try:
-        if answer := remote.do(words):
-            print(answer, flush=True)
-    except Refused as error:
-        print(error, file=sys.stderr, flush=True)
-        return 1 if isinstance(error, Failed) else 2
-    return 0
