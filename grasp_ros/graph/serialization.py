@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -32,11 +32,6 @@ def list_message(
     for numbers in (position, velocity, effort):
         content = _numbers(_length(content, numbers), numbers)
     return _HEAD + content
-
-
-def numbers_message(time_ns: int, numbers: Mapping[str, float], number: int = 0) -> bytes:
-    """The same of numbers by their names; numbered where none may be missed."""
-    return list_message(time_ns, [*numbers], [*numbers.values()], frame=str(number or ""))
 
 
 def force_message(time_ns: int, force: float) -> bytes:

@@ -21,7 +21,7 @@ from grasp_ros.graph.health.peers import Gone, Need
 from grasp_ros.graph.lockstep.admission import Limits
 from grasp_ros.graph.lockstep.steering import Steering
 from grasp_ros.graph.running import Running
-from grasp_ros.graph.serialization import numbers_message, raw_command
+from grasp_ros.graph.serialization import list_message, raw_command
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -203,7 +203,8 @@ class FreeRunning:
         late = [f"no recent command of {side}" for side, held in self._held.items() if held.late]
         self._plant.concern = "; ".join(late)
         if values := self._timing.take():
-            self._quality.publish(numbers_message(self._plant.tick * self._plant.scene.period_ns, values))
+            time_ns = self._plant.tick * self._plant.scene.period_ns
+            self._quality.publish(list_message(time_ns, [*values], [*values.values()]))
 
 
 class Timing:

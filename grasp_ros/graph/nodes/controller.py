@@ -16,7 +16,7 @@ from grasp_ros.graph.health.peers import Gone, Need, PeerNode
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.messages import State, StateReader
 from grasp_ros.graph.ros.node import Phase
-from grasp_ros.graph.serialization import numbers_message, template_of
+from grasp_ros.graph.serialization import list_message, template_of
 from grasp_ros.physics.control import command_of, limited
 from grasp_ros.physics.errors import Refused, described
 from grasp_ros.physics.observation import Observation, asked, check
@@ -158,7 +158,8 @@ class Controller(PeerNode):
         self._staged.clear()
         if self._own is None:
             numbers, self._number = self._scene.numbers_of(self._executable), self._number + 1
-            self._announcements.publish(numbers_message(time_ns, numbers, self._number))
+            numbered = list_message(time_ns, [*numbers], [*numbers.values()], frame=str(self._number))
+            self._announcements.publish(numbered)
             # What a reader has received before it receives the command, it also sees before.
             if not self._announcements.wait_for_all_acked(Duration(seconds=ANNOUNCE_SECONDS)):
                 self.get_logger().warning(f"{CHANGES[self._side].name}: a subscriber did not acknowledge a change")

@@ -83,8 +83,9 @@ class Plant(PeerNode):
         """How it runs with the wall clock, from parameters that exist only there."""
         factor = self.read_only("real_time_factor")
         check_factor(factor)
-        timeouts, reactions = ({NAMES[body]: self.read_only(f"{NAMES[body]}_{name}") for body in scene.system.laws}
-                               for name in ("timeout_s", "on_timeout"))
+        timeouts, reactions = {}, {}
+        for side in (NAMES[body] for body in scene.system.laws):
+            timeouts[side], reactions[side] = self.read_only(f"{side}_timeout_s"), self.read_only(f"{side}_on_timeout")
         return Running(self._accuracy, factor, timeouts, reactions)
 
     def _new_plant(self) -> SampledPlant:
