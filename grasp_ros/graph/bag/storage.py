@@ -147,7 +147,12 @@ class Storage:
             if len(body) != length:
                 raise McapError("a record does not fit into its chunk")
             if opcode == Opcode.MESSAGE:
-                found.append(self._stored(body))
+                number, time_ns = MESSAGE.unpack_from(body)
+                channel = self._channels.get(number)
+                schema = None if channel is None else self._schemas.get(channel.schema_id)
+                if channel is None or schema is None:
+                    raise McapError(f"a message of an unknown channel, {number}")
+                found.append(Stored(channel.topic, schema.name, time_ns, body[MESSAGE.size :]))
             elif not self._defines(opcode, body):
                 raise McapError(f"record {opcode} is not one of a chunk")
             offset += HEAD.size + length
@@ -180,14 +185,6 @@ class Storage:
     def _footer(self) -> Footer:
         footer: Footer = Footer.read(ReadDataStream(BytesIO(self._data[HEAD.size - FOOTER_BYTES : -len(MAGIC)])))
         return footer
-
-    def _stored(self, body: bytes) -> Stored:
-        number, time_ns = MESSAGE.unpack_from(body)
-        channel = self._channels.get(number)
-        schema = None if channel is None else self._schemas.get(channel.schema_id)
-        if channel is None or schema is None:
-            raise McapError(f"a message of an unknown channel, {number}")
-        return Stored(channel.topic, schema.name, time_ns, body[MESSAGE.size :])
 
     def _behind_damage(self, offset: int, why: str) -> int:
         """Where to go on; the end of the file if nothing follows, which is what a recorder leaves that was killed."""

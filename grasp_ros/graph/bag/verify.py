@@ -67,9 +67,6 @@ class Verification(NamedTuple):
         return f"{equal}; {self.problem}" if self.problem else equal
 
 
-_Column = tuple[str, str, Array, Array]  # topic, name, what was recorded, and what it should be
-
-
 def verify(recording: Recording) -> Verification:
     """Simulate the scene of a bag with its recorded inputs, and compare every number that follows from them."""
     ticks, first = 0, None
@@ -79,9 +76,16 @@ def verify(recording: Recording) -> Verification:
         states, stop = _simulate(recording, rows)
         ticks += len(states)
         problem = problem or stop
-        part = rows[: len(states)]
-        found = [found for column in _columns(recording, part, states)
-                 if (found := _first(recording, part, lost, *column))]
+        part, found = rows[: len(states)], []
+        for topic, name, *pair in _columns(recording, part, states):
+            recorded, computed = (np.ascontiguousarray(numbers, dtype=float) for numbers in pair)
+            same = (recorded.view(np.int64) == computed.view(np.int64)) | (np.isnan(recorded) & np.isnan(computed))
+            if topic in lost:  # which `_gap` names
+                same |= lost[topic][part]
+            if not same.all():
+                at = int(np.argmin(same))
+                tick = int(recording.tick[part[at]])
+                found.append(Difference(tick, topic, name, float(recorded[at]), float(computed[at])))
         if found:
             first = min(found, key=lambda difference: difference.tick)
             break
@@ -202,8 +206,8 @@ def _simulate(recording: Recording, rows: np.ndarray) -> tuple[Array, str]:
     return np.concatenate([states, plant.state[None]]), ""
 
 
-def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[_Column]:
-    """Everything of an episode that follows from its inputs."""
+def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[tuple[str, str, Array, Array]]:
+    """Everything of an episode that follows from its inputs: topic, name, what was recorded, what it should be."""
     system = recording.scene.system
     for body in system.present:
         for column, name in enumerate(("position", "velocity"), COLUMN[body]):
@@ -242,18 +246,3 @@ def _lyapunov(recording: Recording, rows: np.ndarray, states: Array, external: A
     residual, alarm, work = (np.append(0.0, part) for part in (balance.residual, balance.alarm, balance.work))
     alone = energy(system, states, external, feedback=False)
     return [*V, alone.mode, residual, alarm, alone.V_c, work, closed]
-
-
-def _first(
-    recording: Recording, rows: np.ndarray, lost: Mapping[str, np.ndarray], topic: str, name: str, recorded: Array,
-    computed: Array,
-) -> Difference | None:
-    """The first number whose bits differ; those of lost messages are left out, and named by `_gap`."""
-    recorded, computed = (np.ascontiguousarray(part, dtype=float) for part in (recorded, computed))
-    differs = (recorded.view(np.int64) != computed.view(np.int64)) & ~(np.isnan(recorded) & np.isnan(computed))
-    if topic in lost:
-        differs &= ~lost[topic][rows]
-    if not differs.any():
-        return None
-    place = int(np.argmax(differs))
-    return Difference(int(recording.tick[rows[place]]), topic, name, float(recorded[place]), float(computed[place]))

@@ -177,9 +177,13 @@ class FreeRunning:
         forces: Array = np.zeros(3)
         for body, (side, held) in zip(self._plant.scene.system.laws, self._held.items(), strict=True):
             before, held.late = held.late, self._plant.tick - held.answers >= self._timeouts[side]
+            reaction = self._running.reactions[side]
             if held.late and not before:
-                self._time_out(side)
-            forces[body] = 0.0 if held.late and self._running.reactions[side] == "zero" else held.force
+                self._plant.count("timeouts")
+                words = (f"{side}: no command newer than {self._running.timeouts[side]:g} s at tick {self._plant.tick};"
+                         f" reaction: {reaction}")
+                (self._plant.fail if reaction == "stop" else self._plant.get_logger().warning)(words)
+            forces[body] = 0.0 if held.late and reaction == "zero" else held.force
             self._timing.age(side, self._plant.tick - held.answers, held.late)
         if self._plant.finished:
             return
@@ -187,16 +191,6 @@ class FreeRunning:
             self.report()
             self._plant.flush(self._quality)  # before the last state, with which a monitor closes its bag
         self._plant.step(forces)
-
-    def _time_out(self, side: str) -> None:
-        self._plant.count("timeouts")
-        reaction = self._running.reactions[side]
-        age = self._running.timeouts[side]
-        words = f"{side}: no command newer than {age:g} s at tick {self._plant.tick}; reaction: {reaction}"
-        if reaction == "stop":
-            self._plant.fail(words)
-            return
-        self._plant.get_logger().warning(words)
 
     def report(self) -> None:
         """Publish the quality of the last second; say whose commands are missing."""
