@@ -177,7 +177,7 @@ class Ticks:
             if (cdr := tick.get(topic)) is None:
                 row += [math.nan] * template.count
                 continue
-            found[topic] = numbers = self.numbers(topic, cdr)
+            found[topic] = numbers = template.read(cdr) or self._decoded(topic, cdr)
             row += numbers[2:]
             if topic != LYAPUNOV and not sum(map(abs, numbers)) <= LARGEST:
                 self._refuse(topic, time_ns, NOT_FINITE)
@@ -191,8 +191,8 @@ class Ticks:
             efforts = zip(self.names, states[-len(self.names) :], strict=True)
             if any(effort for name, effort in efforts if name == NAMES[OBJECT]):
                 self._refuse(JOINT_STATES, time_ns, "an effort of the object; allowed: 0")
-            for topic, numbers in found.items():
-                if numbers[0] != states[0] or numbers[1] != states[1]:
+            for topic, own in found.items():
+                if own[0] != states[0] or own[1] != states[1]:
                     self._refuse(topic, time_ns, "its stamp is not that of the state")
             self._time_ns, self.stamp_ns = time_ns, stamp_ns
         return row
