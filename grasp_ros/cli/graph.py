@@ -10,7 +10,6 @@ import shutil
 import signal
 import sys
 import time
-from collections.abc import Sequence
 from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
@@ -157,14 +156,11 @@ def _has_ticks(bag: Path) -> bool:
         return not isinstance(error, EmptyBagError)
 
 
-def _in_words(spent: Sequence[tuple[float, str]]) -> str:
-    """Wall times of a command at which something had ended, as how long each took."""
-    parts = [f"{what} {end - begin:.1f}" for (begin, _), (end, what) in pairwise(spent)]
-    return f"{time.monotonic() - spent[0][0]:.1f} s: {', '.join(parts)}"
-
-
 def _live(graph: Graph, spent: list[tuple[float, str]]) -> bool:
-    """Start a graph, wait for its end and stop it; returns whether a signal has ended it."""
+    """Start a graph, wait for its end and stop it; returns whether a signal has ended it.
+
+    `spent` gets the wall times at which something had ended.
+    """
     received: list[int] = []
     before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
     note_signals(received)
@@ -210,7 +206,9 @@ def _report(graph: Graph, stopped: bool, spent: list[tuple[float, str]], options
         plots.draw(recording, figure)
         rows.append(("figure", str(figure)))
         spent.append((time.monotonic(), "figure"))
-    print(report.table([*rows, ("wall time", _in_words(spent))]))
+    parts = [f"{what} {end - begin:.1f}" for (begin, _), (end, what) in pairwise(spent)]
+    rows.append(("wall time", f"{time.monotonic() - spent[0][0]:.1f} s: {', '.join(parts)}"))
+    print(report.table(rows))
     return 0 if whole else 1
 
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 
@@ -209,7 +209,11 @@ class Ticks:
         message, names, name = decode(topic, cdr), self.names, self._full[topic]
         if topic == CLOCK:
             return [message.clock.sec, message.clock.nanosec]
-        numbers = _along_x(topic, name, message.wrench) if topic.type == FORCE else message.position
+        if topic.type == FORCE:  # of a command nothing but its force is read, whoever sends it; others have no more
+            force, torque = message.wrench.force, message.wrench.torque
+            if topic not in COMMANDS.values() and any((force.y, force.z, torque.x, torque.y, torque.z)):
+                raise BagError(f"{name}: a force or torque beside force.x; allowed: 0")
+        numbers = [force.x] if topic.type == FORCE else message.position
         if topic == JOINT_STATES:
             lists = message.position, message.velocity, message.effort
             once = len({*message.name}) == len(message.name)
@@ -223,14 +227,6 @@ class Ticks:
                 raise BagError(f"{name}: {', '.join(message.name)}; allowed: {', '.join(LYAPUNOV_NAMES)}")
             numbers = [numbers[message.name.index(name)] for name in LYAPUNOV_NAMES]
         return [message.header.stamp.sec, message.header.stamp.nanosec, *numbers]
-
-
-def _along_x(topic: Topic, name: str, wrench: Any) -> list[float]:
-    """The force of a wrench: all that is read of a command, whoever sends it; others of ours have no other."""
-    force, torque = wrench.force, wrench.torque
-    if topic not in COMMANDS.values() and any((force.y, force.z, torque.x, torque.y, torque.z)):
-        raise BagError(f"{name}: a force or torque beside force.x; allowed: 0")
-    return [force.x]
 
 
 class Changes(dict[int, dict[str, float]]):

@@ -122,18 +122,15 @@ class PeerNode(GraspNode):
             self.sweep()
         self._before = progress
         if not self.begun:
-            self._wait_for_start(now)
+            waited = now - max(self._first_look, self.heartbeats.prepared)
+            self.concern = f"for {waited:.0f} s" if waited > self.patience else ""
+            if waited > self.start_patience and self._ends:
+                self.fail(f"{self.words}; timeout of {self.start_patience:g} s")
             return
         for need in self.needs():
             self._note(need, self._trouble_with(need, now), now)
             if self.finished or self._left:
                 return
-
-    def _wait_for_start(self, now: float) -> None:
-        waited = now - max(self._first_look, self.heartbeats.prepared)
-        self.concern = f"for {waited:.0f} s" if waited > self.patience else ""
-        if waited > self.start_patience and self._ends:
-            self.fail(f"{self.words}; timeout of {self.start_patience:g} s")
 
     def _trouble_with(self, need: Need, now: float) -> Trouble | None:
         """What is wrong with a topic; None if all is well."""

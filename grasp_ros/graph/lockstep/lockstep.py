@@ -138,7 +138,9 @@ class Lockstep:
         """Do what is due once the current state has been answered: reset, finish, pause or advance."""
         plant = self._plant
         resetting, ahead = self._steering.reset_due, self._ahead
-        self._let_go_on(not ahead and (resetting or not self._steering.stands))
+        going = not ahead and (resetting or not self._steering.stands)
+        if self._timer is not None and going is self._timer.is_canceled():  # it would keep others from their turn
+            (self._timer.reset if going else self._timer.cancel)()
         if not plant.begun or plant.finished or ahead or not self._complete:
             return
         self.answered = True
@@ -154,11 +156,6 @@ class Lockstep:
                     forces[side] = force
                 self._commands.clear()
                 plant.step(forces)
-
-    def _let_go_on(self, going: bool) -> None:
-        """Stop the timer of a scene without controllers while nothing is due: it would keep others from their turn."""
-        if self._timer is not None and going is self._timer.is_canceled():
-            (self._timer.reset if going else self._timer.cancel)()
 
     def _refuse_sources(self, waited: float) -> None:
         """End the run, with the names of the sources as soon as discovery has them."""

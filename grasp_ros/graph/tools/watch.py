@@ -142,14 +142,6 @@ class Watch(GraspNode):
             found = json.loads(answer.message)
             self._reported = printable(str(found["state"])), int(found["tick"])
 
-    def _words_of_status(self) -> str:
-        """Why nothing is seen yet: a paused plant publishes nothing."""
-        if self._reported is None:
-            return self._waiting
-        state, tick = self._reported
-        hint = "; → steps it, Space lets it go on" if state == PAUSED and self._keys.there else ""
-        return f"the plant is {state} at tick {tick}{hint}"
-
     def _draw(self) -> None:
         held = COMMANDS.values() if self._lockstep else ()  # in a free run they belong to no state of their own
         there = (topic for topic in (LYAPUNOV, *CONTACTS.values(), *held) if self.writers(topic))
@@ -164,8 +156,11 @@ class Watch(GraspNode):
                 self._live.update(self._view.draw(moment, self._live.console.width), refresh=True)
         elif alone and time.monotonic() > self._there + PATIENCE_SECONDS:
             self.fail(self._nobody)
-        else:
-            self._live.update(Text(self._words_of_status()), refresh=True)
+        else:  # why nothing is seen yet: a paused plant publishes nothing
+            state, tick = self._reported or ("", 0)
+            hint = "; → steps it, Space lets it go on" if state == PAUSED and self._keys.there else ""
+            words = f"the plant is {state} at tick {tick}{hint}" if self._reported else self._waiting
+            self._live.update(Text(words), refresh=True)
         if alone:
             self._reported = None
         else:
