@@ -19,7 +19,7 @@ import rclpy
 from graphs import call
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from processes import DEADLINE, children, end_nodes, growing, node_command, wait_for
+from processes import DEADLINE, GRASP, children, end_nodes, growing, node_command, ran, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
@@ -112,6 +112,23 @@ def test_a_free_run_begins_when_its_monitor_has_heard_all_controllers(context: r
         assert any(need.due == plant.asked for need in plant.needs()) is waits  # so that it does not wait for ever
     executor.shutdown()
     end_nodes(plant, peer)
+
+
+def test_v_is_known_from_the_first_state_of_a_free_run_on(grasp_run: Any, tmp_path: Path) -> None:
+    """The clock starts with the first commands, whose law no bag knew at the first state: none had a V of the feedback.
+
+    After a reset the laws are announced anew, and nothing acts before.
+    """
+    run = grasp_run("case_01", "--set", "time.duration_s=5", "--free-running", "1", "--no-check", "--no-figure")
+    wait_for(lambda: not ran(*GRASP, "ctl", "reset").returncode, "a reset")
+    out, err = run.communicate(timeout=DEADLINE)
+    assert run.returncode == 0, err
+    recording = bag.read(tmp_path / "run" / "bag")
+    assert len(recording.starts) == 2
+    assert recording.lyapunov[0, LYAPUNOV_NAMES.index("closed")] == 1.0
+    assert recording.closed
+    assert recording.energy.V[recording.starts] == pytest.approx([5.1, 5.1])
+    assert re.search(r"certificate +V_c may rise: commands are held", out)
 
 
 def test_periods_of_more_than_half_a_second_are_not_late(launch: Any) -> None:

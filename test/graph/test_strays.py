@@ -98,6 +98,20 @@ def test_who_comes_late_takes_what_comes_before_the_first_state() -> None:
     assert ticks.put(LEFT_COMMAND, command(2 * late, 2.0)) is Arrival.STAMP
 
 
+def test_a_message_that_a_reset_overtakes_is_of_its_state() -> None:
+    """It was of a wrong stamp, far ahead of the state after the reset, and counted as lost."""
+    ticks, late = Synchronizer([LEFT_CONTACT], ["left"], PERIOD, END), 3000
+    ticks.put(JOINT_STATES, state(late))
+    ticks.put(JOINT_STATES, state(0))
+    assert ticks.put(LEFT_CONTACT, command(2 * late, 1.0)) is Arrival.STAMP
+    assert ticks.put(LEFT_CONTACT, command(late, 1.0)) is Arrival.TAKEN
+    assert ticks.put(LEFT_CONTACT, command(0, 2.0)) is Arrival.TAKEN
+    for tick, force in ((late, 1.0), (0, 2.0)):
+        found = ticks.take()
+        assert found is not None
+        assert (found.time_ns, raw_force(found.found[LEFT_CONTACT]), found.lost) == (tick * PERIOD, force, 0)
+
+
 STRAY = """
 import rclpy
 from geometry_msgs.msg import WrenchStamped

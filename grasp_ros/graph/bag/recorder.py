@@ -13,8 +13,10 @@ import os
 import resource
 import threading
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from mcap.writer import CompressionType, IndexType, Writer
 
@@ -47,6 +49,16 @@ def signed(record: Mapping[str, str]) -> dict[str, str]:
     """A metadata record with its checksum: MCAP itself has none before the file is closed."""
     content = {key: value for key, value in record.items() if key != DIGEST}
     return {**content, DIGEST: checksum(repr(sorted(content.items())))}
+
+
+def check_path(path: Path) -> None:
+    """Refuse a path at which a bag cannot be made."""
+    with writing(f"bag: {path}"):
+        with suppress(FileNotFoundError):  # what else is wrong with the path is told
+            path.lstat()
+            raise FileExistsError
+        there = next(parent for parent in path.absolute().parents if parent.exists())
+        TemporaryDirectory(dir=there).cleanup()
 
 
 class Recorder:

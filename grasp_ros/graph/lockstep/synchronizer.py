@@ -104,7 +104,8 @@ class Synchronizer:
         return Arrival.TAKEN
 
     def _put_other(self, topic: Topic, stamp: int, cdr: bytes, sure: bool) -> Arrival:
-        if 0 <= self._newest < stamp - self._ahead_ns:  # of who comes late, the first message may have any
+        # Of who comes late, the first message may have any; a state from before a reset may wait for its own.
+        if 0 <= self._newest < stamp - self._ahead_ns and all(state.time_ns != stamp for _, state, _ in self._states):
             return Arrival.STAMP
         if topic.type == FORCE and not math.isfinite(raw_force(cdr)):
             return Arrival.REFUSED

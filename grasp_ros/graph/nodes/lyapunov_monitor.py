@@ -7,8 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
 
 from grasp_ros.graph.lockstep.synchronizer import Tick
+from grasp_ros.graph.ros.messages import to_ns
 from grasp_ros.graph.serialization import raw_force
 from grasp_ros.physics.energy import energy, energy_balance
 from grasp_ros.physics.errors import Refused
@@ -16,9 +19,10 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.topics import COMMANDS, WINDOW
+from grasp_ros.scene.topics import COMMANDS, WINDOW, Numbers
 
 MOST_WAITING = WINDOW + 100  # announcements of a controller: it makes at most one for a command
+MOST_BYTES = 2**16  # of an announcement
 EXPLAINED = 1e-9  # of the sizes of its terms: two ways of rounding one law
 
 
@@ -37,6 +41,8 @@ class LyapunovMonitor:
         self._scene = scene
         self._waiting: dict[str, deque[Announcement]] = {side: deque() for side in SIDES}
         self._acting: dict[str, int] = {}  # time in ns of the last announcement that acts, where one is known
+        self._numbers = {side: Numbers(late=True) for side in SIDES}
+        self.lost = 0  # announcements that never came
         self._before: tuple[int, Array, Array] | None = None  # time in ns, state and external forces
 
     @property
@@ -45,8 +51,14 @@ class LyapunovMonitor:
         sides = (name.removesuffix("_controller") for name in self._scene.controllers)
         return [side for side in sides if side not in self._acting]
 
-    def announce(self, side: str, announcement: Announcement) -> None:
-        """Take note of a law that will act."""
+    def announce(self, side: str, cdr: bytes) -> None:
+        """Take note of a law that will act, by its serialized message."""
+        if len(cdr) > MOST_BYTES:
+            raise Refused(f"{side}/parameters: {len(cdr)} bytes; allowed: at most {MOST_BYTES}")
+        message = deserialize_message(cdr, JointState)
+        self.lost += self._numbers[side].take(message)
+        stamp, numbers = to_ns(message.header.stamp), dict(zip(message.name, message.position, strict=True))
+        announcement = Announcement(stamp, numbers, cdr)
         wanted = set(self._scene.numbers_of(f"{side}_controller"))
         if set(announcement.numbers) != wanted:
             raise Refused(f"{side}/parameters: {', '.join(announcement.numbers) or 'nothing'}; allowed: exactly"

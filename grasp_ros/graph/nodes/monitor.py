@@ -9,32 +9,27 @@ from contextlib import suppress
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
-from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
-from sensor_msgs.msg import JointState
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
 from grasp_ros.graph.bag import BagError
-from grasp_ros.graph.bag.recorder import NOT_RECORDED, Recorder
+from grasp_ros.graph.bag.recorder import NOT_RECORDED, Recorder, check_path
 from grasp_ros.graph.health.heartbeat import digest
 from grasp_ros.graph.health.peers import Gone, Need, PeerNode
 from grasp_ros.graph.lockstep.admission import Limits, Sources
 from grasp_ros.graph.lockstep.synchronizer import UNCERTAIN_SECONDS, Arrival, Synchronizer, Tick
-from grasp_ros.graph.nodes.lyapunov_monitor import Announcement, LyapunovMonitor
+from grasp_ros.graph.nodes.lyapunov_monitor import LyapunovMonitor
 from grasp_ros.graph.nodes.picture import Picture
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.running import Running
 from grasp_ros.graph.serialization import template_of
-from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.files import writing
 from grasp_ros.scene.topics import (
     CHANGES,
     CLOCK,
@@ -46,7 +41,6 @@ from grasp_ros.scene.topics import (
     RUN,
     SCENE,
     TIMING,
-    Numbers,
     Topic,
     named,
 )
@@ -69,19 +63,13 @@ class Monitor(PeerNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("monitor", **options)
         self._path = Path(self.read_only("bag") or f"grasp_{datetime.now():%Y_%m_%d-%H_%M_%S}")
-        with writing(f"bag: {self._path}"):  # now, and not when a plant comes
-            with suppress(FileNotFoundError):  # what else is wrong with the path is told
-                self._path.lstat()
-                raise FileExistsError
-            there = next(parent for parent in self._path.absolute().parents if parent.exists())
-            TemporaryDirectory(dir=there).cleanup()
+        check_path(self._path)  # now, and not when a plant comes
         self._running: Running | None = None
         self._scene: Scene | None = None
         self._recorder: Recorder | None = None
         self._due: list[tuple[int, Tick, list[tuple[Topic, bytes]]]] = []  # time in the bag, tick, what comes beside
         self._others: list[Subscription] = []  # of what does not come with every state
         self._published, self._advanced = b"", 0.0  # for the last tick, and the wall time at which it came
-        self._numbers = {side: Numbers(late=True) for side in CHANGES}  # of the announcements
         self._early: deque[tuple[Topic, bytes]] = deque(maxlen=1000)  # what comes beside before the first state
         self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
         self._plant, self._at_end = "", False  # identity of the one that is recorded; whether its last tick is
@@ -145,6 +133,7 @@ class Monitor(PeerNode):
         if (scene := self._scene) is None or (running := self._running) is None:
             return
         beside = [] if running.lockstep else [TIMING, *scene.controllers.values()]
+        self._awaited = {topic.name for topic in beside} - {TIMING.name}
         per_tick = [topic for topic in scene.topics if topic != LYAPUNOV and topic not in beside]
         self._lyapunov, self._picture = LyapunovMonitor(scene), Picture(self, scene)
         self._synchronizer = Synchronizer(
@@ -160,9 +149,8 @@ class Monitor(PeerNode):
         self.begun, self.concern, self.phase = True, "", Phase.RUNNING
         self.words = f"recording {running.words}; {scene.certificate_in_words(sampled=True)}"
         self.get_logger().info(self.words)
-        for side, command in COMMANDS.items():
-            if command in scene.topics:
-                self.subscribe(CHANGES[side], partial(self._on_announcement, side), raw=True)
+        self._laws = [self.subscribe(CHANGES[side], partial(self._on_announcement, side), raw=True)
+                      for side, command in COMMANDS.items() if command in scene.topics]
         for topic in per_tick:
             subscription = self.subscribe(topic, partial(self._on_message, topic), raw=True)
             if topic in COMMANDS.values():
@@ -176,6 +164,7 @@ class Monitor(PeerNode):
         assert self._recorder is not None
         if topic in COMMANDS.values():
             self.heartbeats.confirm(topic.name)
+            self._let_wait()
         if len(cdr) > MOST_BYTES or self._beside[topic] > MOST_BESIDE_BYTES:
             self.refuse(DIAGNOSTICS_LEFT_OUT if topic == DIAGNOSTICS else NOT_RECORDED, topic)
         elif self._due:
@@ -187,14 +176,10 @@ class Monitor(PeerNode):
 
     def _on_announcement(self, side: str, cdr: bytes) -> None:
         try:
-            if len(cdr) > MOST_BYTES:
-                raise Refused(f"{side}/parameters: {len(cdr)} bytes; allowed: at most {MOST_BYTES}")
-            message = deserialize_message(cdr, JointState)
-            numbers = dict(zip(message.name, message.position, strict=True))
-            self.count("lost announcements", self._numbers[side].take(message))
-            self._lyapunov.announce(side, Announcement(messages.to_ns(message.header.stamp), numbers, cdr))
+            self._lyapunov.announce(side, cdr)
         except messages.UNREADABLE as error:  # `Refused` is a ValueError
             self.refuse("refused announcements", CHANGES[side], str(error))
+        self.counters["lost announcements"] = self._lyapunov.lost
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
         sources = self._sources.get(topic)  # of commands: is this one nobody else's?
@@ -202,10 +187,11 @@ class Monitor(PeerNode):
         arrival = self._synchronizer.put(topic, cdr, sure)
         if arrival is Arrival.TAKEN:
             self._drain()
-        elif arrival is Arrival.AGAIN:  # what was published has been lost
+        elif arrival is Arrival.AGAIN:
             self.count(arrival.value)
-            self._complete()
-            self._output.publish(self._published)
+            if not self._begins():  # what was published has been lost
+                self._complete()
+                self._output.publish(self._published)
         elif arrival is Arrival.REPEATED:
             self.count(arrival.value)
         else:
@@ -238,8 +224,17 @@ class Monitor(PeerNode):
         self._due.append((self._bag_ns, tick, beside))
         if len(self._due) >= MOST_TICKS or tick.time_ns == self._synchronizer.end_ns:
             self._complete()
-        elif len(self._due) == 1:
+        else:
+            self._let_wait()
+
+    def _let_wait(self) -> None:
+        """Let ticks wait for others for a while."""
+        if self._due and self._soon.is_canceled() and not self._begins():
             self._soon.reset()
+
+    def _begins(self) -> bool:
+        """Whether the first state of a free run waits for its laws, which are announced before the first commands."""
+        return not self.counters["ticks"] and len(self._due) < 2 and bool(self._awaited - {*self.heartbeats.own.hears})
 
     def _complete(self) -> None:
         """Evaluate, record and publish the ticks that wait; none after an alarm."""
@@ -248,6 +243,10 @@ class Monitor(PeerNode):
             return
         assert self._recorder is not None
         self._soon.cancel()
+        if self._lyapunov.unknown:  # what was announced while they waited
+            self.take_waiting(self._laws)
+        late = self._lyapunov.begin(due[0][1].time_ns)
+        due[0][2].extend((CHANGES[side], cdr) for side, cdr in late)
         rows = self._lyapunov.evaluate([tick for _, tick, _ in due])
         for (bag_ns, tick, beside), values in zip(due, rows, strict=True):
             self.count("ticks")
