@@ -63,11 +63,12 @@ def recordings_of(first: Graph, second: Graph, monkeypatch: pytest.MonkeyPatch) 
 
 def rewritten(
     old: Path, new: Path, beside: str = "", late_ns: int = 0, without: Mapping[str, int] = MappingProxyType({}),
-    **options: Any,
+    by_topic: bool = False, **options: Any,
 ) -> None:
     """A copy of a file by the library's own writer with its options.
 
-    With a topic beside, all of it so much later, and `without` the messages of topics from a time in ns on.
+    With a topic beside, all of it so much later, `without` the messages of topics from a time in ns on; `by_topic`: in
+    the order of the topics.
     """
     with old.open("rb") as file, new.open("wb") as copy:
         reader, writer, channels = make_reader(file), Writer(copy, **options), dict[int, int]()
@@ -75,7 +76,8 @@ def rewritten(
         for record in reader.iter_metadata():
             writer.add_metadata(record.name, record.metadata)
         writer.add_attachment(0, 0, "notes.txt", "text/plain", b"of somebody")
-        for schema, channel, message in reader.iter_messages(log_time_order=False):
+        found = [*reader.iter_messages(log_time_order=False)]
+        for schema, channel, message in sorted(found, key=lambda row: row[1].topic) if by_topic else found:
             if message.log_time >= without.get(channel.topic, message.log_time + 1):
                 continue
             if channel.id not in channels:

@@ -127,10 +127,11 @@ ANEW = [
     ({"compression": CompressionType.LZ4}, "its chunks have the compression 'lz4'; allowed: zstd, or none, as"),
     ({"compression": CompressionType.NONE, "index_types": IndexType.NONE, "repeat_channels": False,
       "repeat_schemas": False, "use_statistics": False, "use_summary_offsets": False}, "3001 states follow"),
+    ({"by_topic": True}, "3001 states follow"),
 ]
 
 
-@pytest.mark.parametrize(("options", "words"), ANEW, ids=["no chunks", "lz4", "no index"])
+@pytest.mark.parametrize(("options", "words"), ANEW, ids=["no chunks", "lz4", "no index", "topic by topic"])
 def test_a_bag_of_another_make_is_read_or_refused_and_not_called_damaged(
     two_runs: tuple[Path, Path], tmp_path: Path, command: Any, options: dict[str, Any], words: str
 ) -> None:

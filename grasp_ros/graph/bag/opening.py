@@ -6,6 +6,7 @@ import os
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from itertools import chain, islice
+from operator import attrgetter
 from pathlib import Path
 
 from rosbags.serde import SerdeError
@@ -55,7 +56,7 @@ class Opened:
     In a bag that another program has written anew, from ours, the topics `scene` and `run` say it.
     """
 
-    def __init__(self, path: str | os.PathLike[str], salvage: bool = False) -> None:
+    def __init__(self, path: str | os.PathLike[str], salvage: bool = False, sort: bool = False) -> None:
         self.path = path = given.path("path", path)
         self.storage = open_storage(path, salvage)
         with decoding_bag(path):
@@ -74,8 +75,11 @@ class Opened:
             self.versions = {key.removeprefix(VERSION): word for key, word in own.items() if key.startswith(VERSION)}
             self.names = names_of(self.scene, own)
             known = {(name, topic.type): topic for topic, name in self.names.items()}
+            everything: Iterable[Stored] = chain(first, messages)
+            if sort:  # by the time in the bag
+                everything = sorted(everything, key=attrgetter("time_ns"))
             # Each with its topic; what is foreign is left out where a bag is salvaged.
-            self.messages = self._known(known, chain(first, messages), salvage)
+            self.messages = self._known(known, everything, salvage)
             # Topics whose messages are as they came, not one for each tick: those of commands in a free run.
             self.held: Collection[Topic] = () if self.running.lockstep else self.scene.controllers.values()
 

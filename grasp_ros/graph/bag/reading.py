@@ -18,13 +18,14 @@ from typing import NoReturn
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.graph.bag import BagError, EmptyBagError
+from grasp_ros.graph.bag import BagError, EmptyBagError, OrderError
 from grasp_ros.graph.bag.opening import UNREADABLE, Opened, decoding_bag
 from grasp_ros.graph.bag.recorder import BESIDE, LOST_RECORD, OWN_RECORD, checksum
 from grasp_ros.graph.bag.recording import Recording, acted_from
 from grasp_ros.graph.bag.rosbag2 import decode
 from grasp_ros.graph.bag.storage import Storage, Stored
 from grasp_ros.graph.serialization import template_of
+from grasp_ros.physics import given
 from grasp_ros.physics.layout import OBJECT
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -58,49 +59,57 @@ def read(path: str | os.PathLike[str]) -> Recording:
     BagError
         If the path is not such a bag, or if it is damaged.
     """
-    opened = Opened(path)
-    with decoding_bag(opened.path):
-        scene, reader, changes, timing = opened.scene, Ticks(opened), Changes(), list[Sequence[float]]()
-        quality = () if opened.running.lockstep else timing_names(NAMES[body] for body in scene.system.laws)
-        held = {topic: array("d") for topic in opened.held}
-        takers: dict[Topic, Callable[[Stored], object]] = {
-            **{topic: partial(changes.add, topic, scene) for topic in CHANGES.values()},
-            TIMING: lambda stored: timing.extend(_of_a_plant(quality, stored)),
-            **{topic: partial(_check_text, opened, topic) for topic in (SCENE, RUN)},
-            **{topic: partial(_take_command, forces, topic, reader) for topic, forces in held.items()},
-        }
-        counts = Counter(dict.fromkeys(opened.names, 0))
-        stamps, rows = array("q"), array("d")
-        for time_ns, tick, beside in ticks_of(opened, reader.topics):
-            counts.update([*tick, *(topic for topic, _ in beside)])
-            for topic, stored in beside:
-                if topic in takers:
-                    takers[topic](stored)
-            row = reader.row(time_ns, tick) if tick else []
-            if JOINT_STATES in tick:
-                stamps.extend((time_ns, reader.stamp_ns))
-                rows.extend(row)
-        if not stamps:
-            raise EmptyBagError(f"{opened.path}: holds no tick")
-        _check_metadata(opened.path, opened.storage)
-        times = np.array(stamps).reshape(-1, 2)
-        ends = np.cumsum([template.count for template in reader.topics.values()])[:-1]
-        parts = dict(zip(reader.topics, np.split(np.array(rows).reshape(len(times), -1), ends, axis=1), strict=True))
-        ticks, (states, lyapunov) = times[:, 0] // scene.period_ns, (parts[topic] for topic in (JOINT_STATES, LYAPUNOV))
-        state, effort, command = np.full((len(ticks), 6), np.nan), *np.zeros((2, len(ticks), 2))
-        for body, numbers in zip(scene.system.present, states.reshape(len(ticks), 3, -1).T, strict=True):
-            state[:, COLUMN[body]], state[:, COLUMN[body] + 1] = numbers[:2]
-            if body != OBJECT:
-                effort[:, body] = numbers[2]
-        for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
-            command[:, side] = parts[topic][:, 0] if topic in parts else acted_from(ticks, effort[:, side])
-        return Recording(
-            opened.path, scene, opened.versions, {topic.name: count for topic, count in counts.items()}, ticks, state,
-            effort, command, {output.topic.name: parts[output.topic][:, 0] for output in scene.outputs}, lyapunov,
-            dict(changes), opened.running, ticks[times[:, 1] == 0], _lost(opened.storage),
-            dict(zip(quality, np.array(timing).T, strict=True)) if timing else {}, dict(+changes.unheard),
-            {side: np.array(held[topic]) for side, topic in COMMANDS.items() if topic in held},
-        )
+    path = given.path("path", path)
+    with decoding_bag(path):
+        try:
+            return _recording(Opened(path))
+        except OrderError:  # another program has written it, topic by topic say
+            return _recording(Opened(path, sort=True))
+
+
+def _recording(opened: Opened) -> Recording:
+    """All that is in a bag."""
+    scene, reader, changes, timing = opened.scene, Ticks(opened), Changes(), list[Sequence[float]]()
+    quality = () if opened.running.lockstep else timing_names(NAMES[body] for body in scene.system.laws)
+    held = {topic: array("d") for topic in opened.held}
+    takers: dict[Topic, Callable[[Stored], object]] = {
+        **{topic: partial(changes.add, topic, scene) for topic in CHANGES.values()},
+        TIMING: lambda stored: timing.extend(_of_a_plant(quality, stored)),
+        **{topic: partial(_check_text, opened, topic) for topic in (SCENE, RUN)},
+        **{topic: partial(_take_command, forces, topic, reader) for topic, forces in held.items()},
+    }
+    counts = Counter(dict.fromkeys(opened.names, 0))
+    stamps, rows = array("q"), array("d")
+    for time_ns, tick, beside in ticks_of(opened, reader.topics):
+        counts.update([*tick, *(topic for topic, _ in beside)])
+        for topic, stored in beside:
+            if topic in takers:
+                takers[topic](stored)
+        row = reader.row(time_ns, tick) if tick else []
+        if JOINT_STATES in tick:
+            stamps.extend((time_ns, reader.stamp_ns))
+            rows.extend(row)
+    if not stamps:
+        raise EmptyBagError(f"{opened.path}: holds no tick")
+    _check_metadata(opened.path, opened.storage)
+    times = np.array(stamps).reshape(-1, 2)
+    ends = np.cumsum([template.count for template in reader.topics.values()])[:-1]
+    parts = dict(zip(reader.topics, np.split(np.array(rows).reshape(len(times), -1), ends, axis=1), strict=True))
+    ticks, (states, lyapunov) = times[:, 0] // scene.period_ns, (parts[topic] for topic in (JOINT_STATES, LYAPUNOV))
+    state, effort, command = np.full((len(ticks), 6), np.nan), *np.zeros((2, len(ticks), 2))
+    for body, numbers in zip(scene.system.present, states.reshape(len(ticks), 3, -1).T, strict=True):
+        state[:, COLUMN[body]], state[:, COLUMN[body] + 1] = numbers[:2]
+        if body != OBJECT:
+            effort[:, body] = numbers[2]
+    for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
+        command[:, side] = parts[topic][:, 0] if topic in parts else acted_from(ticks, effort[:, side])
+    return Recording(
+        opened.path, scene, opened.versions, {topic.name: count for topic, count in counts.items()}, ticks, state,
+        effort, command, {output.topic.name: parts[output.topic][:, 0] for output in scene.outputs}, lyapunov,
+        dict(changes), opened.running, ticks[times[:, 1] == 0], _lost(opened.storage),
+        dict(zip(quality, np.array(timing).T, strict=True)) if timing else {}, dict(+changes.unheard),
+        {side: np.array(held[topic]) for side, topic in COMMANDS.items() if topic in held},
+    )
 
 
 def ticks_of(
@@ -171,7 +180,7 @@ class Ticks:
             If they are not those of the next tick.
         """
         if time_ns % self._period_ns or not self._before < time_ns <= MOST_NS:
-            raise BagError(f"{time_ns} ns; allowed: ticks of the scene in their order")
+            raise OrderError(f"{time_ns} ns; allowed: ticks of the scene in their order")
         found, row = dict[Topic, Sequence[float]](), list[float]()
         for topic, template in self.topics.items():
             if (cdr := tick.get(topic)) is None:
