@@ -24,6 +24,7 @@ from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.topics import (
     JOINT_STATES,
     LEFT_COMMAND,
+    LEFT_CONTACT,
     LYAPUNOV,
     LYAPUNOV_NAMES,
     SCENE,
@@ -224,3 +225,15 @@ def test_ticks_that_are_none_are_refused(tmp_path: Path, times: tuple[float, ...
     wrong = round(times[-1] * run.scene.period_ns)
     with pytest.raises(bag.BagError, match=f": {wrong} ns; allowed: ticks of the scene in their order"):
         bag.read(tmp_path / "bag")
+
+
+def test_a_message_that_is_twice_in_a_tick_is_refused_and_of_two_the_last_is_recovered(tmp_path: Path) -> None:
+    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
+    ticks = list(study.ticks_of(run))
+    topic, cdr = next((topic, cdr) for topic, cdr in ticks[5][1] if topic == LEFT_CONTACT)
+    ticks[5][1].insert(0, (topic, changed(topic, cdr, "wrench.force.x", 9.0)))
+    written(tmp_path / "bag", run.scene, ticks)
+    with pytest.raises(bag.BagError, match=r"contact/left: 5000000 ns; allowed: ticks of the scene in their order"):
+        bag.read(tmp_path / "bag")
+    assert recover(tmp_path / "bag", tmp_path / "new").left_out == []
+    assert verify(bag.read(tmp_path / "new")).ticks == 11

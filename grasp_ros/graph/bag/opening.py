@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
+from heapq import merge
 from itertools import chain, islice
 from operator import attrgetter
 from pathlib import Path
@@ -56,8 +58,9 @@ class Opened:
     In a bag that another program has written anew, from ours, the topics `scene` and `run` say it.
     """
 
-    def __init__(self, path: str | os.PathLike[str], salvage: bool = False, sort: bool = False) -> None:
+    def __init__(self, path: str | os.PathLike[str], salvage: bool = False, merges: bool = False) -> None:
         self.path = path = given.path("path", path)
+        self.salvage = salvage  # what is damaged is left out
         self.storage = open_storage(path, salvage)
         with decoding_bag(path):
             messages, records = self.storage.messages(), self.storage.records
@@ -76,8 +79,11 @@ class Opened:
             self.names = names_of(self.scene, own)
             known = {(name, topic.type): topic for topic, name in self.names.items()}
             everything: Iterable[Stored] = chain(first, messages)
-            if sort:  # by the time in the bag
-                everything = sorted(everything, key=attrgetter("time_ns"))
+            if merges:  # topics that lie one behind the other, each in its order
+                rows = defaultdict[str, list[Stored]](list)
+                for stored in everything:
+                    rows[stored.topic].append(stored)
+                everything = merge(*rows.values(), key=attrgetter("time_ns"))
             # Each with its topic; what is foreign is left out where a bag is salvaged.
             self.messages = self._known(known, everything, salvage)
             # Topics whose messages are as they came, not one for each tick: those of commands in a free run.

@@ -48,6 +48,7 @@ from grasp_ros.scene.topics import (
 
 MOST_NS = 2**63 - 1
 LARGEST = 1e100  # of a number: its square is one, too
+IN_ORDER = "allowed: ticks of the scene in their order"
 NOT_FINITE = f"a number is not finite, or beyond {LARGEST:g}"
 
 
@@ -64,7 +65,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
         try:
             return _recording(Opened(path))
         except OrderError:  # another program has written it, topic by topic say
-            return _recording(Opened(path, sort=True))
+            return _recording(Opened(path, merges=True))
 
 
 def _recording(opened: Opened) -> Recording:
@@ -117,14 +118,16 @@ def ticks_of(
 ) -> Iterator[tuple[int, dict[Topic, bytes], list[tuple[Topic, Stored]]]]:
     """Time in ns of each tick, its messages on these topics, and what lies beside them, in the order of the bag.
 
-    A topic has one message for a tick: a second one begins another tick, of the same time.
+    A topic has one message for a tick; of more the last one is salvaged.
     """
     time_ns, tick, beside = 0, dict[Topic, bytes](), list[tuple[Topic, Stored]]()
     for topic, stored in opened.messages:
-        if stored.time_ns != time_ns or topic in tick:
+        if stored.time_ns != time_ns:
             yield time_ns, tick, beside
             time_ns, tick, beside = stored.time_ns, {}, []
         if topic in topics:
+            if topic in tick and not opened.salvage:
+                raise OrderError(f"{stored.topic}: {time_ns} ns; {IN_ORDER}")
             tick[topic] = stored.cdr
         else:
             beside.append((topic, stored))
@@ -180,7 +183,7 @@ class Ticks:
             If they are not those of the next tick.
         """
         if time_ns % self._period_ns or not self._before < time_ns <= MOST_NS:
-            raise OrderError(f"{time_ns} ns; allowed: ticks of the scene in their order")
+            raise OrderError(f"{self._full[next(iter(tick))]}: {time_ns} ns; {IN_ORDER}")
         found, row = dict[Topic, Sequence[float]](), list[float]()
         for topic, template in self.topics.items():
             if (cdr := tick.get(topic)) is None:

@@ -14,7 +14,7 @@ from grasp_ros.graph.bag.recorder import Recorder
 from grasp_ros.scene.topics import CHANGES, CLOCK, LYAPUNOV, RUN, SCENE
 
 MOST_REASONS = 20  # that are told apart
-TICK = re.compile(r"\btick \d+: ")  # which is noted beside the reason
+TICK = re.compile(r"\b(tick \d+: |\d+ ns; )")  # which is noted beside the reason
 
 
 class Recovery(NamedTuple):
