@@ -216,8 +216,6 @@ def _replay(options: argparse.Namespace) -> int:
     from grasp_ros.graph.bag.opening import Opened
 
     states = Opened(options.bag).names[JOINT_STATES]
-    if not _has_ticks(options.bag):
-        raise EmptyBagError(f"{options.bag}: holds no tick")
     _reach(options)
     held = hold(os.environ, states.removesuffix(f"/{JOINT_STATES.name}") or "/")
     held.set_inheritable(True)  # what this process becomes has it to its end

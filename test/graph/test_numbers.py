@@ -22,6 +22,7 @@ from grasp_ros.graph.serialization import list_message
 from grasp_ros.physics.layout import OBJECT
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.topics import (
+    DIAGNOSTICS,
     JOINT_STATES,
     LEFT_COMMAND,
     LEFT_CONTACT,
@@ -237,3 +238,12 @@ def test_a_message_that_is_twice_in_a_tick_is_refused_and_of_two_the_last_is_rec
         bag.read(tmp_path / "bag")
     assert recover(tmp_path / "bag", tmp_path / "new").left_out == []
     assert verify(bag.read(tmp_path / "new")).ticks == 11
+
+
+def test_what_lies_beside_a_tick_that_is_lost_is_said_to_be_left_out(tmp_path: Path) -> None:
+    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
+    ticks = list(study.ticks_of(run))
+    ticks[5] = (ticks[5][0], [(DIAGNOSTICS, bytes(16))])
+    written(tmp_path / "bag", run.scene, ticks)
+    [left] = recover(tmp_path / "bag", tmp_path / "new").left_out
+    assert left.startswith("parts of 1 ticks, the first 5: no message on contact/left, ")

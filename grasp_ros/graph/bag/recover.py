@@ -44,7 +44,7 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
 
     try:
         for time_ns, tick, others in ticks_of(opened, wanted):
-            if not tick:
+            if not (tick or others):
                 continue
             number, beside = time_ns // scene.period_ns, []
             try:

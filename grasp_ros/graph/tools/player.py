@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import time
+from itertools import chain
 from typing import Any
 
+from grasp_ros.graph.bag import EmptyBagError
 from grasp_ros.graph.bag.opening import Opened
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.topics import WINDOW
+from grasp_ros.scene.topics import JOINT_STATES, WINDOW
 
 # For readers to be found, and at most for the first to come and all to be connected: who missed the announcements at
 # the start hears of this node again after 3 s.
@@ -28,9 +30,15 @@ class Player(GraspNode):
         self._rate = self.read_only("rate")
         if not 0.0 < self._rate < math.inf:
             raise Refused(f"rate: {self._rate!r} is not allowed; allowed: a number > 0")
-        self._rows = bag.messages
-        self._next = next(self._rows)
-        self._first_ns = self._next[1].time_ns
+        begin = []  # up to the first state
+        for row in bag.messages:
+            begin.append(row)
+            if row[0] == JOINT_STATES:
+                break
+        else:
+            raise EmptyBagError(f"{bag.path}: holds no tick")
+        self._rows = chain(begin[1:], bag.messages)
+        self._next, self._first_ns = begin[0], begin[0][1].time_ns
         self._outputs = {topic: self.create_publisher(messages.TYPES[topic.type], name, messages.qos(topic))
                          for topic, name in bag.names.items()}
         self.counters["messages"] = 0
