@@ -16,7 +16,6 @@ from grasp_ros.physics.layout import Body, Entry, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
-from grasp_ros.scene.topics import LYAPUNOV_NAMES
 from grasp_ros.simulation import Trajectory
 from grasp_ros.simulation.chunk import SETTLED
 from grasp_ros.simulation.summary import MOTION, OUTPUTS, TICKS
@@ -125,7 +124,7 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
     left, right = found["contacts"].values()
     balanced, known = found["balanced_ticks"], not np.isnan(found["work_J"])
     lacks = balanced < found["ticks"]  # numbers of the monitor
-    unknown = np.count_nonzero(recording.lyapunov[:, LYAPUNOV_NAMES.index("closed")] != 1.0)
+    unknown = np.count_nonzero(~recording.law_known)
     none = "unknown: lyapunov missing" if lacks else (
         f"none: at {unknown} of {found['ticks']} ticks the commands are not those of a known law")
     closes = "closes at every tick" if known else f"closes at {balanced} ticks, others are not known"

@@ -59,7 +59,8 @@ class Status(Enum):
 _OUTPUTS, _EVENTS, _FILLED, _WORK = int(Filled.OUTPUTS), int(Filled.EVENTS), len(Filled), len(Work)
 _NO_TIMES, _NOBODY = np.zeros(0), np.zeros(2, dtype=np.int64)
 _DONE, _NO_COMMAND = int(Outcome.DONE), int(Outcome.NO_COMMAND)
-_AT_REST, _BODIES_THAT_ACT = REST_PLACE + SINCE, [0.0] * BODY_NUMBERS  # places of a state; numbers that kernels write
+_AT_REST = REST_PLACE + SINCE  # in the block of a state
+_BODIES_THAT_ACT = [0.0] * BODY_NUMBERS  # `Plant.bodies`, which the kernels write
 
 
 class Observer(Protocol):

@@ -33,7 +33,8 @@ class Plant(NamedTuple):
 
 BODY_NUMBERS, PAIR_NUMBERS = 12, 4
 COULOMB = 2 * BODY_NUMBERS + PAIR_NUMBERS  # its place in the block of a plant
-PLANT_NUMBERS, STATE_NUMBERS, REST_PLACE = COULOMB + 4, 20, 17  # the last one of `State.rest` in its block
+PLANT_NUMBERS, STATE_NUMBERS = COULOMB + 4, 20
+REST_PLACE = 17  # where `State.rest` begins in the block of a state
 
 
 def plant_of(block: Array) -> Plant:

@@ -215,12 +215,18 @@ class Recording(Tabular, Frozen):
                 for side in SIDES if f"{side}_age_p99_all" in self.timing}
 
     @property
+    def law_known(self) -> np.ndarray:
+        """Whether the laws of the controllers were known and ran, by tick (n,)."""
+        known: np.ndarray = self.lyapunov[:, LYAPUNOV_NAMES.index("closed")] == 1.0
+        return known
+
+    @property
     def closed(self) -> bool:
         """Whether V belongs to laws that were known and ran, at every tick.
 
         In a free run they may be announced some ticks after a start, as long as nothing acts.
         """
-        known = self.lyapunov[:, LYAPUNOV_NAMES.index("closed")] == 1.0
+        known = self.law_known
         if self.running.lockstep or not known.any():
             return bool(known.all())
         latest = np.maximum.accumulate(np.where(known, np.arange(len(known)), -1))

@@ -22,7 +22,7 @@ from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.topics import COMMANDS, WINDOW, Numbers
 
 MOST_WAITING = WINDOW + 100  # announcements of a controller: it makes at most one for a command
-MOST_BYTES = 2**16  # of an announcement
+MOST_BYTES = 2**16  # of a message beside the states
 EXPLAINED = 1e-9  # of the sizes of its terms: two ways of rounding one law
 
 

@@ -21,7 +21,7 @@ from grasp_ros.graph.health.heartbeat import digest
 from grasp_ros.graph.health.peers import Gone, Need, PeerNode
 from grasp_ros.graph.lockstep.admission import Limits, Sources
 from grasp_ros.graph.lockstep.synchronizer import UNCERTAIN_SECONDS, Arrival, Synchronizer, Tick
-from grasp_ros.graph.nodes.lyapunov_monitor import LyapunovMonitor
+from grasp_ros.graph.nodes.lyapunov_monitor import MOST_BYTES, LyapunovMonitor
 from grasp_ros.graph.nodes.picture import Picture
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import Phase
@@ -48,7 +48,7 @@ from grasp_ros.scene.versions import versions
 
 MOST_TICKS, MOST_SECONDS = 128, 0.05  # that are evaluated at once, and of wall time that a tick waits for others
 BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what came before a signal, and without any more of it
-MOST_BYTES, MOST_BESIDE_BYTES = 2**16, 2**24  # beside the states: of a message; of a topic from report to report
+MOST_BESIDE_BYTES = 2**24  # beside the states: of a topic from report to report
 DIAGNOSTICS_LEFT_OUT = "diagnostics not recorded"  # which anybody on the host may send
 
 
