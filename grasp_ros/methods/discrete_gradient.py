@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.exact.compilation.jit import kernel
+from grasp_ros.exact.impact import energy_quotient
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.equations import SLIVER, Work, parameters, put
@@ -42,26 +43,9 @@ def solve(problem: Problem) -> Solution:
 
 
 @kernel
-def quotient(u0: float, u1: float) -> Any:
-    """(u1^(5/2) - u0^(5/2)) / (u1 - u0) * 2/5 without cancellation, and its derivative by u1; u < 0 counts as 0."""
-    if u0 <= 0.0 and u1 <= 0.0:
-        return 0.0, 0.0
-    a, b = math.sqrt(max(u0, 0.0)), math.sqrt(max(u1, 0.0))
-    if u0 <= 0.0:
-        span, b3 = u1 - u0, b * b * b
-        return 0.4 * b3 * b * b / span, b3 / span - 0.4 * b3 * b * b / (span * span)
-    if u1 <= 0.0:
-        span, a5 = u0 - u1, a * a * a * a * a
-        return 0.4 * a5 / span, 0.4 * a5 / (span * span)
-    total = b**4 + b**3 * a + b * b * a * a + b * a**3 + a**4
-    slope = 3.0 * b**3 + 6.0 * b * b * a + 4.0 * b * a * a + 2.0 * a**3
-    return 0.4 * total / (a + b), 0.2 * slope / (a + b) ** 2
-
-
-@kernel
 def mean_force(hertzian: float, loss: float, u0: float, u1: float, h: float) -> Any:
     """F of the step and its derivative by u1."""
-    elastic, slope = quotient(u0, u1)
+    elastic, slope = energy_quotient(u0, u1)
     factor = 1.0 + loss * (u1 - u0) / h
     if not factor > 0.0:
         return 0.0, 0.0

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.physics.impact_law import elastic_force, stored_energy
+from grasp_ros.physics.impact_law import STORED, elastic_force, stored_energy
 from grasp_ros.physics.layout import EPS, OBJECT, Law, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
@@ -132,7 +132,7 @@ class Systems:
         presses for a time t, and p v for an impact at v that loses all of v.
         """
         loss = self._pairs[..., Law.DISSIPATION]
-        outward = np.minimum(self.duration, 0.4 * loss * np.maximum(-self.gap, 0.0))  # s, separating at 1/p
+        outward = np.minimum(self.duration, loss / STORED * np.maximum(-self.gap, 0.0))  # s, separating at 1/p
         force = self.elastic * outward + self.pressed * self.duration
         return loss * self.touching * (self.speed[:, :OBJECT] + self.speed[:, OBJECT:] + force / self.reduced)
 

@@ -4,10 +4,8 @@
 
 u > 0 is penetration, u' > 0 approach, H in N/m^1.5, p in s/m. Each function takes floats or NumPy arrays, and
 `exact.impact` compiles the same source for the kernels. `model.impact_force` combines them for any u and u'.
-Another exponent changes powers of w in `exact.contact.series` and `sensitivity.base_series`, TAIL in
-`exact.contact.taylor_step`, a mean slope in `sensitivity.propagate`, scales in `exact.contact.step_unit`, the impulse
-in `domain`, bounds of `lyapunov.reach`, quotients of `methods.discrete_gradient`, and the key of H, its unit and texts
-in `scene.effects.contact` and `scene.parameter`. Tests: docs/oracles.md.
+Another exponent changes this file, powers of w in `exact.contact.series` and `sensitivity.base_series`, and the key of
+H with its unit in `domain`, `scene.effects.contact` and `scene.parameter`. Tests: docs/oracles.md.
 
 References
 ----------
@@ -16,9 +14,14 @@ K. H. Hunt, F. R. E. Crossley, Coefficient of restitution interpreted as damping
 (1975): the damping in proportion to the elastic force.
 """
 
+import math
 from typing import Any
 
 import numpy as np
+
+EXPONENT = 1.5
+STORED = 1.0 + EXPONENT  # exponent of the elastic energy in u
+STORED_ROOT = round(2.0 * STORED)  # the same in sqrt(u), a whole number
 
 
 def elastic_force(hertzian: Any, u: Any) -> Any:
@@ -28,7 +31,7 @@ def elastic_force(hertzian: Any, u: Any) -> Any:
 
 def elastic_slope(hertzian: Any, u: Any) -> Any:
     """Derivative of the elastic force by u, (3/2) H u^(1/2) in N/m, for u >= 0 in m."""
-    return 1.5 * hertzian * np.sqrt(u)
+    return EXPONENT * hertzian * np.sqrt(u)
 
 
 def damping_factor(dissipation: Any, u_rate: Any) -> Any:
@@ -38,4 +41,23 @@ def damping_factor(dissipation: Any, u_rate: Any) -> Any:
 
 def stored_energy(hertzian: Any, u: Any) -> Any:
     """Elastic energy (2/5) H u^(5/2) in J, for u >= 0 in m; V counts it twice, (19)."""
-    return 0.4 * hertzian * u * u * np.sqrt(u)
+    return 1.0 / STORED * hertzian * u * u * np.sqrt(u)
+
+
+def energy_quotient(u0: float, u1: float) -> Any:
+    """Difference quotient of the energy stored at u0 and u1, in m, and its derivative by u1, for H = 1; u < 0 has none.
+
+    Without cancellation: a divided difference in the square roots of u.
+    """
+    if u0 <= 0.0 and u1 <= 0.0:
+        return 0.0, 0.0
+    a, b = math.sqrt(max(u0, 0.0)), math.sqrt(max(u1, 0.0))
+    if u0 <= 0.0:
+        span, b3 = u1 - u0, b * b * b
+        return 0.4 * b3 * b * b / span, b3 / span - 0.4 * b3 * b * b / (span * span)
+    if u1 <= 0.0:
+        span, a5 = u0 - u1, a * a * a * a * a
+        return 0.4 * a5 / span, 0.4 * a5 / (span * span)
+    total = b**4 + b**3 * a + b * b * a * a + b * a**3 + a**4
+    slope = 3.0 * b**3 + 6.0 * b * b * a + 4.0 * b * a * a + 2.0 * a**3
+    return 0.4 * total / (a + b), 0.2 * slope / (a + b) ** 2

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from grasp_ros.physics.energy import elastic_level, mechanical_levels, pairs_of
+from grasp_ros.physics.impact_law import STORED
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of
 from grasp_ros.physics.model import Array, Contact, in_contact
 from grasp_ros.physics.system import BODIES, System
@@ -72,8 +73,9 @@ def reach(bodies: Any, pairs: Any, V_c: Any) -> Any:
     if bodies[RIGHT, Of.MASS] > 0.0:
         driven = bodies[RIGHT, Of.STIFFNESS] > 0.0 and bodies[RIGHT, Of.FORCE] == 0.0
         right = np.sqrt(V_c / bodies[RIGHT, Of.STIFFNESS]) if driven else np.inf
-    u_l = (1.25 * V_c / pairs[LEFT, Law.HERTZIAN]) ** 0.4 if pairs[LEFT, Law.HERTZIAN] > 0.0 else np.inf
-    u_r = (1.25 * V_c / pairs[RIGHT, Law.HERTZIAN]) ** 0.4 if pairs[RIGHT, Law.HERTZIAN] > 0.0 else np.inf
+    hertzian_l, hertzian_r = pairs[LEFT, Law.HERTZIAN], pairs[RIGHT, Law.HERTZIAN]
+    u_l = (0.5 * STORED * V_c / hertzian_l) ** (1.0 / STORED) if hertzian_l > 0.0 else np.inf
+    u_r = (0.5 * STORED * V_c / hertzian_r) ** (1.0 / STORED) if hertzian_r > 0.0 else np.inf
     if bodies[OBJECT, Of.MASS] > 0.0:
         arms = bodies[LEFT, Of.MASS] > 0.0 and bodies[RIGHT, Of.MASS] > 0.0
         middle = max(left + u_l, right + u_r) if arms and bodies[OBJECT, Of.FORCE] == 0.0 else np.inf

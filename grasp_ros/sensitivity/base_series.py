@@ -6,6 +6,7 @@ from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.compilation.vectors import HALF, add_product, load_half, spread_half, store
 from grasp_ros.exact.records import Array
+from grasp_ros.physics.impact_law import EXPONENT
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Pair, V, X, Z
 from grasp_ros.sensitivity.tangents import AHEAD, WEIGHTS, Row, TangentMotion, TangentTable, Weight
 
@@ -84,7 +85,7 @@ def base_series(motion: TangentMotion, table: TangentTable, n: int) -> None:
         sign, v = 1.0 if side == LEFT else -1.0, velocity_lane(side)
         for k in range(n):
             i, j = LANES * (k + 1), HALF * k + side
-            store(weights, WEIGHTS * (Weight.SLOPE + side) + HALF * k, spread_half(1.5 * hertzian * second[j]))
+            store(weights, WEIGHTS * (Weight.SLOPE + side) + HALF * k, spread_half(EXPONENT * hertzian * second[j]))
             store(weights, WEIGHTS * (Weight.DRAG + side) + HALF * k, spread_half(loss * hertzian * second[j + 2]))
             rows[Row.HERTZIAN + side, k] = second[j + 2] + loss * third[j]
             rows[Row.LOSS + side, k] = hertzian * third[j]

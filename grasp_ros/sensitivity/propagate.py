@@ -21,6 +21,7 @@ from grasp_ros.exact.numerics.polynomial import invert_time
 from grasp_ros.exact.numerics.roots import value_and_rate
 from grasp_ros.exact.records import Array, Order, Step
 from grasp_ros.exact.tolerances import SURFACE
+from grasp_ros.physics.impact_law import EXPONENT
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, Slide, U, V, X
 from grasp_ros.sensitivity.base_series import touches
 from grasp_ros.sensitivity.contact import exact_length, expand_tangents, shift, step_tangents
@@ -178,9 +179,10 @@ def add_neglected(motion: TangentMotion, moved: Array, side: Body, span: float) 
     if deepest <= 0.0:
         return
     rate = approach(motion.y if after > u else motion.before, side)
-    root = math.sqrt(deepest) / (1.0 + 0.5 * abs(rate) * span / deepest)  # the mean of sqrt(u), for u = a t^n
     factor = max(damping_factor(motion.pairs[side, Law.DISSIPATION], rate), 0.0)
-    impulse = span * factor * elastic_slope(motion.pairs[side, Law.HERTZIAN], root * root)
+    slope = elastic_slope(motion.pairs[side, Law.HERTZIAN], deepest)
+    mean = slope / (1.0 + (EXPONENT - 1.0) * abs(rate) * span / deepest)  # for u = a t^n
+    impulse = span * factor * mean
     arm_mass, mass = motion.bodies[side, Of.MASS], motion.bodies[OBJECT, Of.MASS]
     for j in range(moved.shape[1]):
         apart = moved[arm - 1, j] - moved[X.O, j]

@@ -15,6 +15,7 @@ from grasp_ros.exact.kinematics import approach, other, reduced_mass, relative_m
 from grasp_ros.exact.numerics.powers_of_two import near_inverse, power_of_two_root
 from grasp_ros.exact.records import Array, Integers, Order, Plant, Settings, State, Step
 from grasp_ros.exact.tolerances import DECAYS
+from grasp_ros.physics.impact_law import STORED, STORED_ROOT
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, U
 
 RADIUS = 0.5  # of convergence of the series of a step, in its units: the least that is usual
@@ -86,7 +87,7 @@ def new_settings(tolerance: float, highest: int, given: Array) -> Settings:
 def impact_scales(hertzian: float, mu: float, u: float, d: float) -> tuple[float, float]:
     """Scales of sqrt(u) and u' of an impact: the largest of a free impact of this energy (docs/oracles.md, O1)."""
     energy = 0.5 * mu * d * d + stored_energy(hertzian, u)
-    return power_of_two_root(2.5 * energy / hertzian, 5), power_of_two_root(2.0 * energy / mu, 2)
+    return power_of_two_root(STORED * energy / hertzian, STORED_ROOT), power_of_two_root(2.0 * energy / mu, 2)
 
 
 @inlined

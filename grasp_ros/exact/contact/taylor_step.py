@@ -16,9 +16,10 @@ from grasp_ros.exact.numerics.polynomial import INVERSE, curvatures, values
 from grasp_ros.exact.numerics.powers_of_two import near_exp2, near_inverse, near_log2, orders_to_one, power_of_two
 from grasp_ros.exact.records import Array, Integers, Lanes, Order, Plant, Settings, State, Step, Tables
 from grasp_ros.exact.tolerances import DEFECT, STILL
+from grasp_ros.physics.impact_law import STORED_ROOT
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Lane, Pair, U, V, Work, X, Z
 
-TAIL = 5  # at a touch with p = 0 only every fifth coefficient differs from zero
+TAIL = STORED_ROOT  # at a touch with p = 0 all coefficients between multiples of it are zero
 SMALLEST = 1e-290  # of a change
 BELOW, ABOVE = 0.5, 2.0  # length / reach, between which the changes within the reach hold for the step
 FAR_BELOW, FAR_ABOVE = 2.0**-10, 2.0**5  # steps whose unit does not fit; a small unit lets terms underflow
@@ -28,12 +29,12 @@ MAX_UNITS, MOST_FITS = 200, 4
 
 @inlined
 def motion_sizes(c: Array, reach: float) -> Lanes:
-    """Sizes of what moves in each lane within `reach`: the largest of a few terms."""
+    """Sizes of what moves in each lane within `reach`: the largest of five terms."""
     square = reach * reach
     cube, fourth = square * reach, square * square
     low = larger(load(c, LANES) * reach, load(c, 2 * LANES) * square)
     high = larger(load(c, 3 * LANES) * cube, load(c, 4 * LANES) * fourth)
-    return numbers_of(larger(larger(low, high), load(c, TAIL * LANES) * (fourth * reach)))
+    return numbers_of(larger(larger(low, high), load(c, 5 * LANES) * (fourth * reach)))
 
 
 @inlined
