@@ -197,7 +197,7 @@ def motion(data: Measured, scene: Scene, keys: Sequence[str], rows: int) -> tupl
         states = np.vstack([plant.follow(data.inputs[: rows - 1]), plant.state])
         if plant.status is not Status.DONE:
             raise Refused(f"{scene.name}: {plant.stop}")
-    carrier.finish(times[-1] if recorded else scene.duration)
+    carrier.finish()
     events = integrator.event_table
     return states, carrier.out, events[events[:, Entry.KIND] == Transition.TOUCH][:, [Entry.TIME, Entry.BODY]]
 

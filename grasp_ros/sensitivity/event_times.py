@@ -22,7 +22,7 @@ class Moments(NamedTuple):
 
     state: Array  # (e, 6)
     rates: Array  # (e, 6, n) its derivatives
-    forces: Array  # (e, 3, 1 + n) constant forces that act on the bodies, and their derivatives
+    forces: Array  # (e, 3, 2 + n) of each body: mass, infinite while it sticks; constant force, and its derivatives
 
 
 def event_rates(scene: Scene, changes: Directions, sampled: bool, events: Array, moments: Moments) -> Array:
@@ -66,7 +66,7 @@ def event_rates(scene: Scene, changes: Directions, sampled: bool, events: Array,
 
 def accelerations(bodies: Array, pairs: Array, moments: Moments) -> Array:
     """Accelerations (3, e) of the bodies, m/s^2."""
-    push = moments.forces[:, :, 0].T.copy()
+    push = moments.forces[:, :, 1].T.copy()
     for body, place in COLUMN.items():
         x, v = moments.state[:, place : place + 2].T
         push[body] -= bodies[body, Of.STIFFNESS] * x + bodies[body, Of.DAMPING] * v
@@ -74,13 +74,12 @@ def accelerations(bodies: Array, pairs: Array, moments: Moments) -> Array:
         force = sign * impact_force(Contact(*pairs[side]), *closing(side, moments.state))
         push[side] -= force
         push[OBJECT] += force
-    masses = np.where(bodies[:, Of.MASS] > 0.0, bodies[:, Of.MASS], 1.0)  # of what is not there: any
-    return np.asarray(push / masses[:, None])
+    return np.asarray(push / moments.forces[:, :, 0].T)
 
 
 def _excess(pairs: Array, changes: Directions, moments: Moments, gained: Array) -> tuple[Array, Array]:
     """Change (e, n) of what pushes a stuck object beyond its friction, and its rate (e,)."""
-    change, rate = moments.forces[:, OBJECT, 1:].copy(), np.zeros(len(moments.state))
+    change, rate = moments.forces[:, OBJECT, 2:].copy(), np.zeros(len(moments.state))
     for side, sign in SIDES:
         (hertzian, loss), (d_hertzian, d_loss) = pairs[side], changes.pairs[side]
         u, speed = closing(side, moments.state)

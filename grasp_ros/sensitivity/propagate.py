@@ -22,7 +22,7 @@ from grasp_ros.exact.numerics.roots import value_and_rate
 from grasp_ros.exact.records import Array, Order, Step
 from grasp_ros.exact.tolerances import SURFACE
 from grasp_ros.physics.impact_law import EXPONENT
-from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, Slide, U, V, X
+from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, Slide, U, V, X
 from grasp_ros.sensitivity.base_series import touches
 from grasp_ros.sensitivity.contact import exact_length, expand_tangents, shift, step_tangents
 from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent, write_flows
@@ -38,8 +38,6 @@ from grasp_ros.sensitivity.tangents import (
     copy_matrix,
     tangents_at,
 )
-
-GAP = 64.0 * EPS  # of the time: what is longer was rest, of which no segment tells
 
 
 @kernel
@@ -108,7 +106,7 @@ def check_glide(motion: TangentMotion, rates: TangentRates, outputs: TangentOutp
 
 @kernel
 def write_output(motion: TangentMotion, outputs: TangentOutputs, rates: TangentRates) -> None:
-    """Write what stands in `at` to the next output, and the forces that act where they are wanted."""
+    """Write what stands in `at` to the next output, and what acts on the bodies where it is wanted."""
     row = outputs.rows[outputs.counts[Count.FILLED]]
     copy_matrix(outputs.out[row], rates.at)
     outputs.counts[Count.FILLED] += 1
@@ -116,9 +114,10 @@ def write_output(motion: TangentMotion, outputs: TangentOutputs, rates: TangentR
     if row < 0:
         return
     for body in (LEFT, RIGHT, OBJECT):
-        outputs.forces[row, body, 0] = motion.bodies[body, Of.FORCE]
+        outputs.forces[row, body, 0] = motion.bodies[body, Of.MASS]
+        outputs.forces[row, body, 1] = motion.bodies[body, Of.FORCE]
         for j in range(outputs.out.shape[2]):
-            outputs.forces[row, body, 1 + j] = rates.acting[body, Of.FORCE, j]
+            outputs.forces[row, body, 2 + j] = rates.acting[body, Of.FORCE, j]
 
 
 @kernel
@@ -135,34 +134,25 @@ def since(outputs: TangentOutputs, begin: float, span: float) -> float:
 
 
 @kernel
-def rest_until(t: Tangents, time: float) -> None:
-    """Go on to a time at rest, if no segment has led there."""
-    now = t.outputs.numbers[Number.TIME]
-    if time - now <= GAP * time:
-        return
-    if t.motion.mode[OBJECT] != Slide.FREE:
-        scale_object(t.rates.x, 0.0)
+def pass_rest(t: Tangents, span: float) -> None:
+    """Move the tangents over a time at rest, and write the outputs on the way."""
+    begin = t.outputs.numbers[Number.TIME]
+    end = begin + span
     act(t.motion.mode, t.rates, t.inputs)
-    due = True
-    while due:
-        due = next_output(t.outputs) <= time
-        rest_tangent(t.motion, t.rates, t.matrices, since(t.outputs, now, time - now) if due else time - now)
-        if due:
-            write_output(t.motion, t.outputs, t.rates)
+    while next_output(t.outputs) <= end:
+        rest_tangent(t.motion, t.rates, t.matrices, since(t.outputs, begin, span))
+        write_output(t.motion, t.outputs, t.rates)
+    rest_tangent(t.motion, t.rates, t.matrices, span)
     copy_matrix(t.rates.x, t.rates.at)
-    t.outputs.numbers[Number.TIME] = time
+    t.outputs.numbers[Number.TIME] = end
 
 
 @kernel
-def arrive(t: Tangents, interval: float, time: float) -> None:
-    """Take the ticks up to the begin of an interval, each at its time, and go on to a time."""
+def enter_ticks(t: Tangents, interval: float) -> None:
+    """Take the ticks up to the begin of an interval, in s."""
     counts, period = t.outputs.counts, t.outputs.numbers[Number.PERIOD]
     last = math.floor(interval / period + 0.5) if counts[Count.DRIVEN] else counts[Count.TICK]
-    while True:
-        ticks = counts[Count.TICK] < last
-        rest_until(t, (counts[Count.TICK] + 1) * period if ticks else time)
-        if not ticks:
-            return
+    while counts[Count.TICK] < last:
         counts[Count.TICK] += 1
         if enter_tick(t.inputs, t.motion.before, t.rates.x, counts[Count.TICK]):
             t.outputs.numbers[Number.CORNER] = min(t.outputs.numbers[Number.CORNER], counts[Count.TICK] * period)
@@ -264,26 +254,25 @@ def remember(t: Tangents) -> None:
 
 @door
 def propagate(address: int, kind: int, span: float, s: float, unit: float, degree: int) -> int:
-    """Carry the tangents over a segment, which has just ended; called by `callback.notify`.
+    """Carry the tangents over a segment, which has just ended, or a rest, which begins; called by `callback.notify`.
 
-    After a run it is called with FINISH and the time of its end.
+    After a run it is called with FINISH.
     """
-    if kind == REST:  # what acts then is asked for when the next segment, or the end of the run, arrives
-        return 0
     t = tangents_at(address)
-    clock, ends = t.motion.clock, kind == FINISH
-    begin = span if ends else (clock[0] + clock[1] - span) + clock[2]
-    if not ends:
-        if t.outputs.counts[Count.SLIDE] == UNSEEN:
-            check_glide(t.motion, t.rates, t.outputs)
-        pass_friction(t.motion, t.rates.x, t.outputs)
-    arrive(t, span * (1.0 - GAP) if ends else clock[2], begin)
-    if ends:
+    if kind == FINISH:
         copy_matrix(t.rates.at, t.rates.x)
         while next_output(t.outputs) < math.inf:
             write_output(t.motion, t.outputs, t.rates)
         return 0
+    if t.outputs.counts[Count.SLIDE] == UNSEEN:
+        check_glide(t.motion, t.rates, t.outputs)
+    pass_friction(t.motion, t.rates.x, t.outputs)
+    clock = t.motion.clock
+    enter_ticks(t, clock[2])
     t.outputs.numbers[Number.TIME] = (clock[0] + clock[1]) + clock[2]
-    pass_segment(t, kind, begin, span, s, unit, degree)
+    if kind == REST:
+        pass_rest(t, span)
+    else:
+        pass_segment(t, kind, (clock[0] + clock[1] - span) + clock[2], span, s, unit, degree)
     remember(t)
     return 0

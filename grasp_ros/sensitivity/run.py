@@ -35,8 +35,8 @@ class Carrier:
         Derivatives of the state now.
     out : array (m, 6, n)
         At the output times.
-    forces : array (e, 3, 1 + n)
-        Constant forces that act on the bodies at events, N, and behind them their derivatives.
+    forces : array (e, 3, 2 + n)
+        At events, of each body: its mass in kg, infinite while it sticks, the constant force on it in N, and its rates.
     """
 
     def __init__(self, integrator: Integrator, directions: Directions, times: Array, e: int = 0) -> None:
@@ -64,10 +64,10 @@ class Carrier:
             self._block = block_of(self._tangents)
         return np.array([address_of(propagate), self._block.ctypes.data])
 
-    def finish(self, time: float) -> None:
-        """After a run, at its end in s."""
+    def finish(self) -> None:
+        """After a run, at its end."""
         address_of(propagate)
-        propagate(self._block.ctypes.data, FINISH, float(time), 0.0, 0.0, 0)
+        propagate(self._block.ctypes.data, FINISH, 0.0, 0.0, 0.0, 0)
 
     @property
     def corner(self) -> float | None:

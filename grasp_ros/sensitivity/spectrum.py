@@ -66,7 +66,7 @@ def _growth(scene: Scene, places: list[int], accuracy: float, pieces: int) -> Ar
         integrator.advance(piece_s, start=begin)
         if integrator.status is not Status.DONE:
             raise Refused(f"{scene.name}: no Lyapunov exponents of a run that {integrator.stop}")
-        carrier.finish(begin + piece_s)
+        carrier.finish()
         slide = integrator.records.mode[OBJECT]  # FREE without dry friction
         stuck = stuck or slide == Slide.STUCK or (
             slide != Slide.FREE and bool((integrator.event_table[:, Entry.BODY] == OBJECT).any()))  # stick and slip

@@ -131,7 +131,7 @@ class TangentOutputs(NamedTuple):
     grid: Array  # (m,) output times, s, ascending
     rows: Integers  # (m,) where each is written
     out: Array  # (m, 6, n)
-    forces: Array  # (e, 3, 1 + n) constant forces that act on the bodies in the last e rows, N, and their derivatives
+    forces: Array  # (e, 3, 2 + n) in the last e rows: mass of each body, constant force on it, and its derivatives
 
 
 class Tangents(NamedTuple):
@@ -157,7 +157,7 @@ def _padded(array: Array) -> Array:
 def tangents_of(plant: Plant, state: State, changes: Directions, times: Array, e: int) -> Tangents:
     """The tangents of a run that begins, without held commands, for output times (m,) in s, in any order.
 
-    The forces that act are kept at the last e of them.
+    What acts on the bodies is kept at the last e of them.
     """
     n, m, order, x = changes.state.shape[1], len(times), np.argsort(times, kind="stable"), _padded(changes.state)
     wide, counts, numbers = x.shape[1], np.zeros(len(Count), dtype=np.int64), np.zeros(len(Number))
@@ -168,7 +168,7 @@ def tangents_of(plant: Plant, state: State, changes: Directions, times: Array, e
                   zeros(3, ROOM), zeros(wide // HALF * SUMS))
     inputs = Inputs(changes.bodies, np.zeros((3, n)), changes.coulomb[0], np.zeros((2, COLUMNS)),
                     np.zeros((2, COLUMNS, n)), np.zeros((1, 2, 2)), np.zeros((0, 2, n)), changes.external)
-    outputs = TangentOutputs(counts, numbers, times[order], order, np.zeros((m, STATES, n)), np.zeros((e, 3, 1 + n)))
+    outputs = TangentOutputs(counts, numbers, times[order], order, np.zeros((m, STATES, n)), np.zeros((e, 3, 2 + n)))
     return Tangents(motion, rates, table, inputs, outputs, np.zeros((5, STATES, STATES)), zeros(FLOWS))
 
 

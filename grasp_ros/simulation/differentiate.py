@@ -93,7 +93,7 @@ def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
     integrator = integrator_of(run)
     carrier = carry(scene, integrator, changes, times, sampled, len(events))
     states = complete(scene, integrator, sampled, times)
-    carrier.finish(scene.duration)
+    carrier.finish()
     m = len(grid)
     at_events = event_rates(scene, changes, sampled, events, Moments(states[m:], carrier.out[m:], carrier.forces))
     states[:, system.absent_columns] = carrier.out[:, system.absent_columns] = np.nan
@@ -125,6 +125,7 @@ def complete(scene: Scene, integrator: Integrator, sampled: bool, times: Array) 
 def level_rates(system: System, changes: Directions, state: Array, rates: Array) -> Array:
     """Derivatives (m, n) of V_c at states (m, 6) with derivatives (m, 6, n); of bodies with the feedback in them."""
     gradient, explicit, weights, bodies = np.zeros_like(state), [], [], system.closed_loop
+    places = [place for body in system.present for place in (COLUMN[body], COLUMN[body] + 1)]
     for body in system.present:
         place = COLUMN[body]
         x, v = state[:, place], state[:, place + 1]
@@ -141,7 +142,8 @@ def level_rates(system: System, changes: Directions, state: Array, rates: Array)
         gradient[:, back] -= push
         explicit.append(2.0 * stored_energy(1.0, pressed))
         weights.append(changes.pairs[side, Law.HERTZIAN])
-    return np.asarray(np.einsum("mi,min->mn", gradient, rates) + np.stack(explicit, axis=1) @ np.array(weights))
+    moved = np.einsum("mi,min->mn", gradient[:, places], rates[:, places])
+    return np.asarray(moved + np.stack(explicit, axis=1) @ np.array(weights))
 
 
 def with_derivatives(chunk: Chunk, variants: Variants, setup: Setup, keys: Sequence[str], stop: NDArray[np.int64]

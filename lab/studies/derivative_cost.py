@@ -46,5 +46,5 @@ def states_alone(scene: Scene, keys: Sequence[str], times: Array) -> Array:
     integrator = Integrator(scene.system, continuous=True)
     carrier = carry(scene, integrator, directions(scene, keys, False), times, False)
     complete(scene, integrator, False, times)
-    carrier.finish(scene.duration)
+    carrier.finish()
     return carrier.out

@@ -116,6 +116,34 @@ def test_inputs_friction_and_rest(name: str, key: str, width: float) -> None:
     assert np.nanmax(np.abs(found - expected)) <= 3e-5 * np.nanmax(np.abs(expected))
 
 
+@pytest.mark.parametrize("period", [0.1, 0.01])
+def test_an_object_that_a_pulse_moves_from_rest(period: float) -> None:
+    """Friction holds it until the pulse; from then on v = (f - F) t / m."""
+    scene = made(1.5, period, object=body(), object_friction={"coulomb_N": 0.5},
+                 object_pulse={"force_N": 1.0, "start_s": 1.0, "length_s": 0.5})
+    keys = ["object_friction.coulomb_N", "object_pulse.force_N"]
+    run = simulate(scene, grid=[0.45, 1.0, 1.25, 1.5], sensitivity=keys)
+    assert run.sensitivity is not None
+    moving = np.array([0.0, 0.0, 0.25, 0.5])
+    expected = np.stack([0.5 * moving**2, moving], axis=1)
+    for place, sign in ((0, -1.0), (1, 1.0)):
+        found = run.sensitivity.state_rates[:, 2:4, place]
+        np.testing.assert_allclose(found, sign * expected, rtol=1e-12, atol=1e-15)
+
+
+def test_times_at_which_a_force_ends_and_returns_beside_a_stuck_object() -> None:
+    scene = made(0.1, 0.01, left_arm=body(1.0, 0.02, stiffness_N_per_m=50.0), object=body(),
+                 right_arm=body(10.0, -0.01, stiffness_N_per_m=500.0), object_friction={"coulomb_N": 100.0},
+                 left_contact={"hertz_N_per_m1_5": 1e4, "dissipation_s_per_m": 8.0},
+                 right_contact={"hertz_N_per_m1_5": 1e4, "dissipation_s_per_m": 0.1},
+                 left_arm_table={"time_s": [0.0, 0.02], "force_N": [-30.0, 20.0]})
+    low, high = (simulate(scene.changed({"left_arm.mass_kg": 1.0 + width})) for width in (-1e-6, 1e-6))
+    found = derivatives(scene, "left_arm.mass_kg")
+    assert found.event_table[:, 2].tolist() == [Transition.CLAMP, Transition.REENTRY]
+    expected = (high.event_table[:, 0] - low.event_table[:, 0]) / 2e-6
+    np.testing.assert_allclose(found.event_rates[:, 0], expected, rtol=1e-6)
+
+
 @pytest.mark.parametrize("name", ["case_01", "delay", "sine", "friction"])
 def test_the_motion_is_that_of_a_plain_run(name: str) -> None:
     scene = horizon(name, 2.0)
@@ -164,16 +192,17 @@ def test_directions_do_not_touch_each_other() -> None:
         np.testing.assert_allclose(several.state_rates[..., place], alone.state_rates[..., 0], rtol=1e-13, atol=0.0)
 
 
-def test_rates_of_the_energy() -> None:
-    scene = horizon("preload", 0.8)
-    for key, width in (("left_arm.mass_kg", 1e-6), ("left_contact.hertz_N_per_m1_5", 1e-2),
-                       ("left_feedback.set_point_m", 1e-8)):
-        section, _, name = key.partition(".")
-        value = scene.values[section][name]
-        low, high = (simulate(scene.changed({key: at}), grid=[0.8]).energy.V_c[-1]
-                     for at in (value - width, value + width))
-        found = derivatives(scene, key)
-        np.testing.assert_allclose(found.V_c_rates[-1, 0], (high - low) / (2.0 * width), rtol=1e-5, atol=1e-9)
+@pytest.mark.parametrize(("name", "key", "width"), [
+    ("preload", "left_arm.mass_kg", 1e-6), ("preload", "left_contact.hertz_N_per_m1_5", 1e-2),
+    ("preload", "left_feedback.set_point_m", 1e-8), ("hammer", "object.mass_kg", 1e-6),
+])
+def test_rates_of_the_energy(name: str, key: str, width: float) -> None:
+    scene = horizon(name, 0.8)
+    section, _, number = key.partition(".")
+    value = scene.values[section][number]
+    low, high = (simulate(scene.changed({key: at}), grid=[0.8]).energy.V_c[-1] for at in (value - width, value + width))
+    found = derivatives(scene, key)
+    np.testing.assert_allclose(found.V_c_rates[-1, 0], (high - low) / (2.0 * width), rtol=1e-5, atol=1e-9)
 
 
 @pytest.mark.parametrize(("name", "key", "word"), [

@@ -144,7 +144,7 @@ def advance(
             return outcome.value
         settle_pairs(plant, state, settings, out)
         if rests(plant, state):
-            notify_rest(out.observer)
+            notify_rest(out.observer, span)
             rest(state, loop)
             continue
         state.rest[SINCE] = math.inf  # a segment moves on

@@ -72,10 +72,10 @@ def reader(kind: Any) -> Any:
 
 
 @inlined
-def notify_rest(observer: Integers) -> None:
-    """Call the observer where nothing moves."""
+def notify_rest(observer: Integers, span: float) -> None:
+    """Call the observer where nothing moves, with how long that lasts in s: to the end of an interval."""
     if observer[ADDRESS] != 0:
-        call(observer[ADDRESS], observer[CONTEXT], REST, 0.0, 0.0, 0.0, 0)
+        call(observer[ADDRESS], observer[CONTEXT], REST, span, 0.0, 0.0, 0)
 
 
 @inlined
