@@ -57,7 +57,10 @@ def heat(axes: Axes, plan: Plan, values: np.ndarray, label: str) -> None:
     far = shown.count() and shown.min() > 0.0 and shown.max() > LOG_FROM * shown.min()
     norm = LogNorm() if far else Normalize()
     mesh = axes.pcolormesh(edges(x), edges(y), shown, cmap=colors, norm=norm, rasterized=True)
-    axes.figure.colorbar(mesh, ax=axes, label=label)
+    if shown.count():
+        grey = "; grey: not finite" if shown.count() < shown.size else ""
+        axes.figure.colorbar(mesh, ax=axes, label=label + grey)
+    _say_if_none(axes, values)
     axes.set(xlabel=label_of(x.name), xscale=_scale(x), ylabel=label_of(y.name), yscale=_scale(y))
 
 

@@ -85,7 +85,7 @@ def compose(
         if not len(instance("motion", motion, Tabular, A_MOTION).t) or motion.t[0] == motion.t[-1]:
             raise Refused("nothing to draw: the motion has fewer than two output times")
     captions = names("captions", captions if captions is not None else [
-        motion.scene.feedback_in_words(getattr(motion, "sampled", True)) for motion in motions])  # a recording is
+        motion.scene.feedback_in_words(_sampled(motion)) for motion in motions])
     if not 0 < len(motions) == len(captions):
         raise Refused(f"captions: {len(captions)} for {len(motions)} motions; allowed: a motion, and one for each")
     usual = WIDTH_MM if len(motions) == 1 else 150.0 * len(motions)
@@ -120,6 +120,11 @@ def compose(
         figure.align_ylabels(grid[:, 0])
         figure.canvas.draw()  # the layout, with the letters of this context
         return figure
+
+
+def _sampled(motion: Motion) -> bool:
+    """Whether commands are held, as in every recording."""
+    return getattr(motion, "sampled", True)
 
 
 def end_of(motion: Motion) -> float:
@@ -165,10 +170,11 @@ def driven(motion: Motion) -> list[int]:
 
 
 def inputs(axes: Axes, motion: Motion) -> None:
-    """Forces of controllers and from outside."""
-    forces = motion.inputs
+    """Forces of controllers and from outside; what is held from tick to tick as steps."""
+    forces, style = motion.inputs, "steps-post" if _sampled(motion) else "default"
     for body in driven(motion):
-        axes.plot(motion.t, forces[:, body], label=f"input_{NAMES[body]}", color=COLORS[body], linewidth=1.0)
+        axes.plot(motion.t, forces[:, body], label=f"input_{NAMES[body]}", color=COLORS[body], linewidth=1.0,
+                  drawstyle=style)
 
 
 def impacts(axes: Axes, motion: Motion) -> None:

@@ -79,7 +79,7 @@ COLUMNS: tuple[Column, ...] = (
     *(Column(f"impact_{name}", "N", f"impact force of the {name} contact") for name in SIDES),
     Column("V", "J", "the paper's Lyapunov function (16)"),
     Column("V_c", "J", "its continuous repair, twice the energy"),
-    Column("V_rate", "W", "its rate (18)"),
+    Column("V_rate", "W", "the rate of V_c under continuous feedback (18)"),
     Column("mode", "1", "contacts: 0 none, 1 left, 2 right, 3 both"),
 )
 HEADS = {own.name: own.name + _ENDINGS[own.unit] for own in (TIME, *COLUMNS)}  # of a text file, by columns
