@@ -147,13 +147,13 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _has_ticks(bag: Path) -> bool:
-    """Whether there is a bag to keep: with a state, which a run that waited to its end has not, or unreadable."""
+    """Whether there is a bag to keep: with a state, which a run that waited to its end has not, or damaged."""
     from grasp_ros.graph.bag.opening import Opened
 
     try:
         return bag.exists() and any(topic == JOINT_STATES for topic, _ in Opened(bag).messages)
     except Refused as error:
-        return not isinstance(error, EmptyBagError)
+        return not isinstance(error, EmptyBagError) and any(file.stat().st_size for file in bag.glob("*.mcap"))
 
 
 def _live(graph: Graph, spent: list[tuple[float, str]]) -> bool:

@@ -155,7 +155,7 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
 
 def recorded_span(recording: Recording) -> str:
     """Which part of a scene a bag has, and in how many runs of it."""
-    begin, end, runs = recording.t[0], recording.t[-1], len(recording.starts)
+    begin, end, runs = recording.t[0], recording.t[-1], recording.resets + 1
     return (f"{begin:g} to " if begin else "") + f"{end:g} s of {recording.scene.duration:g} s" + (
         f", in {runs} runs of the scene" if runs > 1 else "")
 

@@ -141,6 +141,9 @@ def test_a_bag_of_another_make_is_read_or_refused_and_not_called_damaged(
     assert found.returncode == (2 if "allowed" in words else 0)
     if found.returncode:
         assert words.partition(";")[0] in command("recover", "new.mcap").stderr
+    elif "by_topic" in options:
+        assert command("recover", "new.mcap").returncode == 0
+        assert words in command("verify", "new_recovered").stdout
 
 
 @pytest.mark.parametrize(("without", "tick", "lost"), [

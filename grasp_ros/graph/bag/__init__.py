@@ -17,10 +17,6 @@ class EmptyBagError(BagError):
     """A bag without a tick."""
 
 
-class OrderError(BagError):
-    """Ticks that are not in the order of their times."""
-
-
 def __getattr__(name: str) -> Any:
     """What reads, with the simulation that it needs, when it is first used: a monitor only writes."""
     if name not in ("Recording", "read"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+from contextlib import suppress
 from pathlib import Path
 
 CHUNK_BYTES = 2**18  # a chunk ends at this size, too
@@ -29,7 +30,8 @@ class Sink:
         """Give the reserve back; does nothing the second time."""
         if self._spare >= 0:
             os.close(self._spare)
-            self._reserve.unlink(missing_ok=True)
+            with suppress(OSError):  # somebody has taken its directory away
+                self._reserve.unlink()
             self._spare = -1
 
     def write(self, data: bytes) -> int:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from heapq import merge
-from itertools import chain, islice
+from itertools import chain, islice, pairwise
 from operator import attrgetter
 from pathlib import Path
 
@@ -16,12 +16,12 @@ from rosbags.serde import SerdeError
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
 from grasp_ros.graph.bag import BagError, EmptyBagError
-from grasp_ros.graph.bag.recorder import OWN_RECORD, VERSION
+from grasp_ros.graph.bag.recorder import LIBRARY, OWN_RECORD, VERSION
 from grasp_ros.graph.bag.rosbag2 import TOPIC, decode, names_of, topics_of
 from grasp_ros.graph.bag.storage import CONVERT, Storage, Stored
 from grasp_ros.physics import given
 from grasp_ros.scene.files import DAMAGE, decoding, reading
-from grasp_ros.scene.topics import DIAGNOSTICS, RUN, SCENE, Topic
+from grasp_ros.scene.topics import CLOCK, DIAGNOSTICS, RUN, SCENE, Topic
 
 KIND = "a bag of this package"
 MOST_AHEAD = 16  # messages, of which two say what the bag holds
@@ -58,7 +58,7 @@ class Opened:
     In a bag that another program has written anew, from ours, the topics `scene` and `run` say it.
     """
 
-    def __init__(self, path: str | os.PathLike[str], salvage: bool = False, merges: bool = False) -> None:
+    def __init__(self, path: str | os.PathLike[str], salvage: bool = False) -> None:
         self.path = path = given.path("path", path)
         self.salvage = salvage  # what is damaged is left out
         self.storage = open_storage(path, salvage)
@@ -71,7 +71,8 @@ class Opened:
                     raise BagError(f"{path}: its messages are compressed one by one; allowed: chunks, {CONVERT}")
                 records[OWN_RECORD] = _said(first, path)
             if OWN_RECORD not in records:
-                raise EmptyBagError(f"{path}: holds no tick")
+                why = "".join(f": {why}" for _, _, why in self.storage.left_out[:1])
+                raise EmptyBagError(f"{path}: holds no tick{why}")
             own = records[OWN_RECORD]
             self.scene = scenes.parse(own["scene"], path.name, str(path))
             self.running = runnings.parse(own["run"])
@@ -79,13 +80,14 @@ class Opened:
             self.names = names_of(self.scene, own)
             known = {(name, topic.type): topic for topic, name in self.names.items()}
             everything: Iterable[Stored] = chain(first, messages)
-            if merges:  # topics that lie one behind the other, each in its order
+            if not self.storage.library.startswith(LIBRARY) and _jumps_back(path, salvage):
+                # Topics lie one behind the other, each in its order.
                 rows = defaultdict[str, list[Stored]](list)
                 for stored in everything:
                     rows[stored.topic].append(stored)
                 everything = merge(*rows.values(), key=attrgetter("time_ns"))
-            # Each with its topic; what is foreign is left out where a bag is salvaged.
-            self.messages = self._known(known, everything, salvage)
+            self.foreign: Counter[str] = Counter()  # messages by topic that a bag which is salvaged leaves out
+            self.messages = self._known(known, everything, salvage)  # each with its topic
             # Topics whose messages are as they came, not one for each tick: those of commands in a free run.
             self.held: Collection[Topic] = () if self.running.lockstep else self.scene.controllers.values()
 
@@ -95,8 +97,15 @@ class Opened:
             for stored in messages:
                 if topic := known.get((stored.topic, stored.type)):
                     yield topic, stored
-                elif not salvage:
+                elif salvage:
+                    self.foreign[stored.topic] += 1
+                else:
                     raise BagError(f"{self.path}: {stored.topic}: {stored.type} is not a topic of its scene")
+
+
+def _jumps_back(path: Path, salvage: bool) -> bool:
+    """Whether the messages of a file are in another order than that of their times."""
+    return any(after.time_ns < before.time_ns for before, after in pairwise(open_storage(path, salvage).messages()))
 
 
 def _said(first: Collection[Stored], path: Path) -> dict[str, str]:
@@ -107,5 +116,8 @@ def _said(first: Collection[Stored], path: Path) -> dict[str, str]:
         raise BagError(f"{path}: not {KIND}: nothing at its beginning on {missing}; allowed: all topics of a graph")
     found = {topic.name: decode(topic, there[topic.name].cdr).data for topic in (SCENE, RUN)}
     scene, root = scenes.parse(found["scene"], path.name, str(path)), there[SCENE.name].topic.removesuffix(SCENE.name)
-    moved = [topic for topic in topics_of(scene) if topic != DIAGNOSTICS]
-    return {**found, **{f"{TOPIC}{topic.name}": f"{root}{topic.name.lstrip('/')}" for topic in moved}}
+    names = {topic: f"{root}{topic.name.lstrip('/')}" for topic in topics_of(scene) if topic != DIAGNOSTICS}
+    for stored in first:
+        if stored.type == CLOCK.type:  # whose name only a remapping changes
+            names[CLOCK] = stored.topic
+    return {**found, **{f"{TOPIC}{topic.name}": name for topic, name in names.items()}}

@@ -18,7 +18,7 @@ from typing import NoReturn
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.graph.bag import BagError, EmptyBagError, OrderError
+from grasp_ros.graph.bag import BagError, EmptyBagError
 from grasp_ros.graph.bag.opening import UNREADABLE, Opened, decoding_bag
 from grasp_ros.graph.bag.recorder import BESIDE, LOST_RECORD, OWN_RECORD, checksum
 from grasp_ros.graph.bag.recording import Recording, acted_from
@@ -62,10 +62,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
     """
     path = given.path("path", path)
     with decoding_bag(path):
-        try:
-            return _recording(Opened(path))
-        except OrderError:  # another program has written it, topic by topic say
-            return _recording(Opened(path, merges=True))
+        return _recording(Opened(path))
 
 
 def _recording(opened: Opened) -> Recording:
@@ -127,7 +124,7 @@ def ticks_of(
             time_ns, tick, beside = stored.time_ns, {}, []
         if topic in topics:
             if topic in tick and not opened.salvage:
-                raise OrderError(f"{stored.topic}: {time_ns} ns; {IN_ORDER}")
+                raise BagError(f"{stored.topic}: {time_ns} ns; {IN_ORDER}")
             tick[topic] = stored.cdr
         else:
             beside.append((topic, stored))
@@ -183,7 +180,7 @@ class Ticks:
             If they are not those of the next tick.
         """
         if time_ns % self._period_ns or not self._before < time_ns <= MOST_NS:
-            raise OrderError(f"{self._full[next(iter(tick))]}: {time_ns} ns; {IN_ORDER}")
+            raise BagError(f"{self._full[next(iter(tick))]}: {time_ns} ns; {IN_ORDER}")
         found, row = dict[Topic, Sequence[float]](), list[float]()
         for topic, template in self.topics.items():
             if (cdr := tick.get(topic)) is None:

@@ -34,6 +34,7 @@ from grasp_ros.scene.topics import CLOCK, RUN, SCENE, Topic
 FLUSH_SECONDS = 0.1  # a kill loses what came after the last flush; flush and disk have as long again
 INDEX_BYTES = 256  # at most what the index holds of one chunk
 OWN_RECORD, LOST_RECORD = "grasp_ros", "grasp_ros/lost"
+LIBRARY = "grasp_ros-"  # how the name of what has written a bag begins
 # Counted in LOST_RECORD: all that is in the bag, and what came beside the states and was too much.
 WRITTEN, NOT_RECORDED = "messages written", "messages not recorded"
 VERSION = "version "  # how the keys of versions begin
@@ -105,7 +106,7 @@ class Recorder:
             enable_data_crcs=True,
         )
         self._messages = Messages(self._writer)
-        self._writer.start(rosbag2.PROFILE, f"grasp_ros-{version('grasp_ros')}")
+        self._writer.start(rosbag2.PROFILE, f"{LIBRARY}{version('grasp_ros')}")
         self._writer.add_metadata(OWN_RECORD, signed(self._custom))
         schemas = {
             kind: self._writer.register_schema(kind, rosbag2.SCHEMA_ENCODING, rosbag2.definition(kind))

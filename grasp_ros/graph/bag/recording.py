@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import Any
@@ -112,9 +112,8 @@ class Recording(Tabular, Frozen):
     @cached_property
     def scene_tick(self) -> np.ndarray:
         """Ticks (n,) of the scene: those of the bag since the last reset."""
-        starts = self.starts if len(self.starts) else np.zeros(1, dtype=np.int64)
-        ticks: np.ndarray = self.tick - starts[np.maximum(np.searchsorted(starts, self.tick, side="right") - 1, 0)]
-        return ticks
+        begins = np.union1d(0, self.starts)  # a bag of a late monitor lacks the first one
+        return np.asarray(self.tick - begins[np.searchsorted(begins, self.tick, side="right") - 1])
 
     @cached_property
     def parts(self) -> list[tuple[scenes.Scene, slice]]:
@@ -168,7 +167,7 @@ class Recording(Tabular, Frozen):
             raise Refused(f"{self.path}: allowed: two ticks or more, and the forces that acted at each")
         wait = self.scene.system.delay
         forces = np.vstack([acted[wait:-1], np.zeros((1 + wait, 2))]).T.tolist()  # from the last tick on nothing acts
-        laws = {side: partial(_recorded, forces[body]) for side, body in SIDES.items()
+        laws = {side: lambda tick, *_, own=forces[body]: own[tick] for side, body in SIDES.items()
                 if body in self.scene.system.laws}
         numbers = {"time.duration_s": float(self.t[-1])}
         for name, force in ((name, force) for now in self.changes.values() for name, force in now.items()):
@@ -176,6 +175,11 @@ class Recording(Tabular, Frozen):
             if key == "limit_N":  # it was raised: forces may exceed the first one
                 numbers[name] = max(force, numbers.get(name, self.scene.values[section][key]))
         return simulate(self.scene.changed(numbers), sampled=True, controllers=laws, setting=self.running.accuracy)
+
+    @property
+    def resets(self) -> int:
+        """How often the plant was put back while it was recorded."""
+        return int(np.count_nonzero(self.starts > 0))
 
     @property
     def whole(self) -> bool:
@@ -217,8 +221,7 @@ class Recording(Tabular, Frozen):
     @property
     def law_known(self) -> np.ndarray:
         """Whether the laws of the controllers were known and ran, by tick (n,)."""
-        known: np.ndarray = self.lyapunov[:, LYAPUNOV_NAMES.index("closed")] == 1.0
-        return known
+        return np.asarray(self.lyapunov[:, LYAPUNOV_NAMES.index("closed")] == 1.0)
 
     @property
     def closed(self) -> bool:
@@ -293,8 +296,3 @@ def acted_from(ticks: np.ndarray, effort: Array) -> Array:
     acted[:-1] = effort[1:]
     acted[:-1][np.diff(ticks) != 1] = np.nan
     return acted
-
-
-def _recorded(forces: list[float], tick: int, t: float, x: float, v: float) -> float:
-    """A law that answers each tick with the force that acted from it on."""
-    return forces[tick]

@@ -63,6 +63,7 @@ class Storage:
         # Both are complete when all messages have been taken.
         self.left_out: list[tuple[int, int, str]] = []  # offset, size and reason of what was not read
         self.records: dict[str, dict[str, str]] = {}  # of metadata, by name
+        self.library = ""  # which has written it
         self._channels: dict[int, Channel] = {}
         self._schemas: dict[int, Schema] = {}
         with path.open("rb") as file:
@@ -83,6 +84,7 @@ class Storage:
             end = self._end_of(offset)
             try:
                 if end is None:
+                    self._refuse_long(offset)
                     raise EOFError("the rest of a record is missing")
                 opcode, body = data[offset], data[offset + HEAD.size : end]
                 if opcode == Opcode.DATA_END:
@@ -118,11 +120,21 @@ class Storage:
         end = offset + HEAD.size + length
         return int(end) if length <= RECORD_BYTES and end <= len(self._data) else None
 
+    def _refuse_long(self, offset: int) -> None:
+        """Refuse a record that is all there, but longer than any of a bag."""
+        if offset + HEAD.size <= len(self._data):
+            _, length = HEAD.unpack_from(self._data, offset)
+            if RECORD_BYTES < length <= len(self._data) - offset - HEAD.size:
+                raise AnotherMakeError(f"a record of {length} bytes; allowed: at most {RECORD_BYTES}")
+
     def _read(self, opcode: int, body: bytes) -> Iterator[Stored]:
         stream = ReadDataStream(BytesIO(body))
-        if opcode == Opcode.HEADER and Header.read(stream).profile != PROFILE:
-            raise BagError(f"{self.path}: not a bag of this package: no file of ROS 2")
-        if opcode == Opcode.METADATA:
+        if opcode == Opcode.HEADER:
+            header = Header.read(stream)
+            self.library = header.library
+            if header.profile != PROFILE:
+                raise BagError(f"{self.path}: not a bag of this package: no file of ROS 2")
+        elif opcode == Opcode.METADATA:
             found = Metadata.read(stream)
             if found.name in (OWN_RECORD, LOST_RECORD) and found.metadata != signed(found.metadata):
                 raise McapError("the checksum of the metadata is wrong")
@@ -135,7 +147,7 @@ class Storage:
                 raise McapError("an index that is not as long as it claims")
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
             raise AnotherMakeError("its messages are not in chunks; allowed: chunks")
-        elif opcode not in (Opcode.HEADER, Opcode.ATTACHMENT):
+        elif opcode != Opcode.ATTACHMENT:
             raise McapError(f"record {opcode} is not one of a bag")
 
     def _messages(self, data: bytes) -> Iterator[Stored]:

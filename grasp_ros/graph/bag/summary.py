@@ -24,9 +24,9 @@ def summary(recording: Recording) -> dict[str, Any]:
     found: dict[str, Any] = {
         "bag": str(recording.path), "size_bytes": recording.size, "title": scene.title, "watch": scene.watch,
         "warnings": list(scene.warnings), "feedback": scene.feedback_in_words(sampled=True),
-        "lockstep": running.lockstep, "accuracy": running.accuracy, "resets": max(len(recording.starts) - 1, 0),
-        "ticks": len(recording.tick), "begin_s": float(recording.t[0]), "duration_s": float(recording.t[-1]),
-        "scene_duration_s": scene.duration,
+        "lockstep": running.lockstep, "accuracy": running.accuracy, "resets": recording.resets,
+        "ticks": len(recording.tick), "begin_s": float(recording.t[0]),
+        "duration_s": float(recording.t[-1] - recording.t[0]), "scene_duration_s": scene.duration,
         "topics": {name: {"messages": count, "rate_Hz": rates[name]} for name, count in recording.counts.items()
                    if count},
         "missing": {name: count for name, count in recording.missing.items() if count},

@@ -141,7 +141,7 @@ def answers_of(recording: Recording) -> dict[str, Answers]:
 def _same_without_ros(recording: Recording, answers: dict[str, Answers]) -> bool | None:
     """Whether the scene with its own laws has the recorded states and commands, without a graph."""
     others = any(found.differs or found.lost or found.commands < len(recording.tick) for found in answers.values())
-    late = len(recording.starts) > 1 or recording.tick[-1] > recording.scene.ticks
+    late = recording.resets or recording.tick[-1] > recording.scene.ticks
     if others or late or not recording.running.lockstep:
         return None
     run = simulate(recording.scene, sampled=True, grid=recording.t, setting=recording.running.accuracy,

@@ -231,9 +231,11 @@ class Plant(PeerNode):
             self._bar.update(self._plant.tick - self._bar.n)
 
     def close(self) -> None:
-        """End the progress bar, and deliver what a finished run has published."""
+        """End the progress bar, tell how a run that ends early kept its time, and deliver what has been published."""
         self._show()
         with suppress(OSError):
             self._bar.close()
+        if self.begun:
+            self.loop.report()
         if self.finished and not self.exit_code:
             self.flush(self._states, *(publisher for publisher, _, _ in self._forces))

@@ -142,6 +142,9 @@ class ParameterNode(Node):
                     continue
                 why = self.why_read_only if "." in name else ParameterNode.why_read_only
                 return SetParametersResult(successful=False, reason=f"{name}: {why}")
+            if not declared.dynamic_typing and type(parameter.value) is not type(held):
+                why = f"{parameter.value!r} is not allowed; allowed: {KINDS[type(held)]}"
+                return SetParametersResult(successful=False, reason=f"{name}: {why}")
             numbers.append(parameter)
         return super().set_parameters_atomically(numbers) if numbers else SetParametersResult(successful=True)
 
