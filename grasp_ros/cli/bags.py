@@ -6,6 +6,7 @@ import argparse
 import math
 import sys
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 from grasp_ros.cli.arguments import add_command, add_file, add_json, add_output
@@ -15,6 +16,8 @@ from grasp_ros.physics.errors import Refused
 
 if TYPE_CHECKING:  # what is not asked for is not imported, which takes a while
     from grasp_ros.graph.bag.recording import Recording
+
+MOST_LETTERS = 200  # of the ticks that a recovered bag lacks
 
 
 def add_to(commands: Any) -> None:
@@ -68,7 +71,7 @@ def _recover(options: argparse.Namespace) -> int:
     found = recover(options.bag, new)
     for words in found.left_out:
         print(f"left out: {words}")
-    missing = f"; without the ticks {found.missing}" if found.missing else ""
+    missing = f"; without the ticks {shorten(found.missing, MOST_LETTERS, placeholder='...')}" if found.missing else ""
     print(f"{found.ticks} ticks written to {new}{missing}")
     return 0
 

@@ -15,10 +15,10 @@ REACTIONS = ("hold", "zero", "stop")
 LEAST = 1e-6  # real-time factor
 
 
-def check_factor(factor: float) -> None:
-    """Refuse what no free run can have as its simulated seconds per second."""
+def check_factor(factor: float, name: str = "real_time_factor") -> None:
+    """Refuse what no free run, and no replay, can have as its simulated seconds per second."""
     if not LEAST <= factor <= 1.0 / LEAST:
-        raise Refused(f"real_time_factor: {factor!r} is not allowed; allowed: {LEAST:g} to {1.0 / LEAST:g}")
+        raise Refused(f"{name}: {factor!r} is not allowed; allowed: {LEAST:g} to {1.0 / LEAST:g}")
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,10 @@ class Running:
         """For a reader."""
         if self.lockstep:
             return "lockstep"
-        silence = sorted({f"{self.reactions[side]} after {seconds:g} s" for side, seconds in self.timeouts.items()})
-        without = f"; on timeout: {' or '.join(silence)}" if silence else ""
+        silence = {side: f"{self.reactions[side]} after {seconds:g} s" for side, seconds in self.timeouts.items()}
+        alike = sorted({*silence.values()})
+        words = alike if len(alike) == 1 else [f"{side} {reaction}" for side, reaction in silence.items()]
+        without = f"; on timeout: {', '.join(words)}" if words else ""
         return f"free-running, {self.real_time_factor:g} s per second{without}"
 
     def to_yaml(self) -> str:

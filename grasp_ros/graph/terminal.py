@@ -21,6 +21,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from grasp_ros.graph.running import check_factor
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -180,8 +181,7 @@ def play(recording: Recording, rate: float, first: float | None = None) -> None:
     """
     times = recording.t
     first = float(times[0]) if first is None else first
-    if not 0.0 < rate < np.inf:
-        raise Refused(f"--rate: {rate!r} is not allowed; allowed: a number > 0")
+    check_factor(rate, "--rate")
     if not times[0] <= first <= times[-1]:
         raise Refused(f"--from: {first!r} is not allowed; allowed: {times[0]:g} to {times[-1]:g} s")
     row, paused, at, since = 0, False, first, time.monotonic()  # what is shown; since when time goes by, from where

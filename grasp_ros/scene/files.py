@@ -123,6 +123,8 @@ def decoding(path: object, kind: str, refusal: type[Refused] = Refused, also: tu
         yield
     except DAMAGE + also as error:
         if isinstance(error, Refused) and str(error).startswith(str(path)):  # a door behind this one has said it all
+            if isinstance(error, refusal):
+                raise
             raise refusal(str(error)) from None
         reason = " ".join(str(error).split()) or type(error).__name__
         raise refusal(f"{path}: not {kind}: {reason}") from None

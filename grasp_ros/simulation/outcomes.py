@@ -97,7 +97,7 @@ _GROUPS: dict[str, tuple[Outcome, ...]] = {
             ("work_inputs", "work of held commands and external forces", Seen.WORK),
         )),
     "V_c_rise": (Outcome(
-        "V_c_rise", "J", "largest rise of V_c above what it was before, as events, steps and changes of inputs show it",
+        "V_c_rise", "J", "largest rise of V_c above what it was before, at events, steps and changes of inputs alone",
         Wanted.RISE, _column("seen", Seen.RISE)),),
     "extremes": tuple(
         Outcome(f"{column.name}_{which}", column.unit, f"{word} {column.text}", Wanted.MOTION,

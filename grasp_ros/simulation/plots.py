@@ -191,10 +191,18 @@ def energies(axes: Axes, motion: Motion) -> None:
     axes.plot(motion.t, level.V_c, color="black", linewidth=1.2, label="V_c" if known else f"V_c of {PLANT_ALONE}")
     if known and not np.array_equal(level.V, level.V_c, equal_nan=True):
         axes.plot(motion.t, level.V, color=V_COLOR, linewidth=1.0, linestyle="--", label="V of the paper")
-    if 0.0 < level.V_c.min() < 0.3 * level.V_c.max():
-        axes.set_yscale("log")
-    elif level.V_c.min() >= 0.0 and axes.get_yscale() == "linear":
-        axes.set_ylim(0.0, max(axes.get_ylim()[1], 1.1 * level.V_c.max() or 1.0))
+    _scale_energies(axes)
+
+
+def _scale_energies(axes: Axes) -> None:
+    """A scale for all motions that share an axis: logarithmic where V_c falls far and stays above 0."""
+    lines = [line for own in axes.get_shared_y_axes().get_siblings(axes) for line in own.get_lines()]
+    levels = np.concatenate([line.get_ydata() for line in lines if str(line.get_label()).startswith("V_c")])
+    low, high = levels.min(), levels.max()
+    axes.autoscale(axis="y")
+    axes.set_yscale("log" if 0.0 < low < 0.3 * high else "linear")
+    if low >= 0.0 and axes.get_yscale() == "linear":
+        axes.set_ylim(0.0, max(axes.get_ylim()[1], 1.1 * high or 1.0))
 
 
 def contact_spans(motion: Motion, side: int) -> list[tuple[float, float]]:

@@ -53,6 +53,17 @@ def test_a_motion_that_begins_with_little_energy_comes_to_rest(place: float) -> 
     assert run.state[-1, 0] == pytest.approx(-9.81 * math.sin(0.2) / 100.0, rel=1e-15)
 
 
+def test_what_creeps_does_not_rest() -> None:
+    """A damper that balanced a spring was taken for a rest: x stayed at 1 m."""
+    scene = scenes.compose("creeps", {
+        "time": {"duration_s": 1e5, "control_period_s": 100.0}, "loop": {},
+        "left_arm": {"mass_kg": 1e-12, "position_m": 1.0, "velocity_m_per_s": 0.0, "stiffness_N_per_m": 100.0,
+                     "damping_Ns_per_m": 1e10},
+        "left_feedback": {"position_gain_N_per_m": 0.0, "velocity_gain_Ns_per_m": 0.0},
+    })
+    assert simulate(scene, grid=[1e5]).state[-1, 0] == pytest.approx(math.exp(-1e-3), rel=1e-13)
+
+
 @pytest.mark.parametrize("horizon", [50.0, 200.0, 1e4])
 def test_a_decayed_motion_near_critical_damping_rests(horizon: float) -> None:
     """A gap of 1e-310 m was followed until a search did not end."""

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -204,6 +205,20 @@ def test_a_bag_tells_for_how_long_a_command_was_missing(grasp_run: Any, tmp_path
     assert 300 < late < 2500
     for text in (out, command("inspect", "run/bag").stdout):
         assert re.search(rf"timed out +left for {late} periods, in which its last command was older than", text)
+
+
+def test_a_run_that_is_interrupted_tells_the_ages_of_its_end(grasp_run: Any, tmp_path: Path, command: Any) -> None:
+    """They were those of up to a second before, and a limit that was broken ended with status 0."""
+    (tmp_path / "hangs.py").write_text(HANGS.replace("0.5)", "5)"))
+    run = grasp_run(*THREE_SECONDS, "--free-running", "1", "--controller", "left=hangs:law", "--max-age", "90")
+    assert any("no command newer than 0.1 s" in line for line in run.stderr)
+    run.send_signal(signal.SIGINT)
+    _, err = run.communicate(timeout=DEADLINE)
+    recording = bag.read(tmp_path / "run" / "bag")
+    assert recording.ages["left"][1] >= 100.0
+    assert recording.timed_out["left"] > 0
+    assert f"--max-age 90: the oldest command was {recording.ages['left'][1]:g} periods old" in err
+    assert run.returncode == 1
 
 
 @pytest.mark.thorough

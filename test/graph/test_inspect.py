@@ -57,6 +57,11 @@ def test_contacts_at_the_begin_count_again_after_a_reset(tmp_path: Path) -> None
         name: np.tile(getattr(once, name), (2, 1)) for name in ("state", "command", "effort", "lyapunov")})
     assert len(once.tick) == 51
     assert [summary(each)["contacts"] for each in (once, twice)] == [{"left": n, "right": 0} for n in (1, 2)]
+    late = replace(twice, starts=twice.starts[1:], **{
+        name: getattr(twice, name)[10:] for name in ("tick", "state", "command", "effort", "lyapunov")})
+    assert late.scene_tick.tolist() == [*range(10, 51), *range(51)]
+    assert [summary(each)["resets"] for each in (once, twice, late)] == [0, 1, 1]
+    assert (summary(late)["begin_s"], summary(late)["duration_s"]) == pytest.approx((0.01, 0.091))
 
 
 def test_limits_of_a_free_run_are_none_of_lockstep(recorded: tuple[Path, Trajectory], command: Any) -> None:

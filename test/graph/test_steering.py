@@ -210,7 +210,8 @@ def test_a_pause_ends_a_step_that_goes_on(node: tuple[Any, SingleThreadedExecuto
     plant = [*START, "plant", "--ros-args", "-p", "scene:=arm_alone", "-p", "paused:=true", "-p", "steps:=15000"]
     launch(*plant, stderr=subprocess.DEVNULL)
     launch(*START, "left_controller", stderr=subprocess.DEVNULL)
-    assert json.loads(call("step", node).message)["goal"]["tick"] == 15000
+    begun = json.loads(call("step", node).message)
+    assert (begun["goal"]["tick"], begun["asked"]) == (15000, 15000)
     wait_for(lambda: json.loads(call("status", node).message)["tick"] > 10, "some steps")
     paused = call("pause", node)
     found = [json.loads(answer.message) for answer in (paused, call("status", node))]

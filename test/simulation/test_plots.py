@@ -65,6 +65,18 @@ def test_a_figure_shows_what_the_table_says() -> None:
         compose([alone], panels=[plots.PANELS["impact"]])
 
 
+def test_one_scale_for_all_energies_of_a_row_and_steps_for_what_is_held() -> None:
+    names = ("case_01", "tilt_hold", "tilt_lose")
+    runs = [simulate(scenes.load(name), sampled=True) for name in names]
+    panels = [plots.PANELS["energy"], plots.PANELS["input"]]
+    for some, scale in ((runs[:1], "log"), (runs, "linear"), (runs[::-1], "linear")):
+        figure = compose(some, panels=panels)
+        assert {axes.get_yscale() for axes in figure.axes[: len(some)]} == {scale}
+        low = min(run.energy.V_c.min() for run in some)
+        assert figure.axes[0].get_ylim()[0] < low
+        assert {line.get_drawstyle() for line in figure.axes[-1].lines} == {"steps-post"}
+
+
 def test_contacts_of_a_recording_are_those_of_the_events() -> None:
     run = simulate(scenes.load("case_03"), grid=np.linspace(0.0, 20.0, 20001))
 

@@ -58,7 +58,7 @@ def stays(plant: Plant, state: State, body: Body) -> bool:
             push += force if (side == LEFT) == (body == OBJECT) else -force
             held += elastic_slope(plant.pairs[side, Law.HERTZIAN], max(state.y[U.L + side], 0.0))
     stiffness = row[Of.STIFFNESS] + held
-    a = own_acceleration(row, x, v) + push / row[Of.MASS]
+    a = own_acceleration(row, x, 0.0) + push / row[Of.MASS]  # a damper holds nothing
     if stiffness > 0.0:
         return bool(abs(a) * row[Of.MASS] <= stiffness * REST * max(state.rest[LENGTH], abs(x)))
     return bool(v == 0.0 and abs(a) <= DERIVATIVE * own_size(row, x, v))

@@ -100,7 +100,8 @@ class Opened:
                 elif salvage:
                     self.foreign[stored.topic] += 1
                 else:
-                    raise BagError(f"{self.path}: {stored.topic}: {stored.type} is not a topic of its scene")
+                    raise BagError(f"{self.path}: {stored.topic}: {stored.type} is not a topic of its scene;"
+                                   " `grasp recover` leaves it out")
 
 
 def _jumps_back(path: Path, salvage: bool) -> bool:

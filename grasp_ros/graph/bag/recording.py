@@ -268,11 +268,13 @@ class Recording(Tabular, Frozen):
 
     @property
     def missing(self) -> dict[str, int]:
-        """Ticks up to the last one that the bag shows without a message, by topic; not of commands in a free run.
+        """Ticks up to the last one without a message, by topic; of commands in a free run, if there is none at all.
 
         And what is `unheard`, and what the monitor says that it did not record, or did and is not there.
         """
-        held = () if self.running.lockstep else self.scene.controllers.values()
+        held = () if self.running.lockstep else [
+            topic for side, topic in zip(self.scene.system.laws, self.scene.controllers.values(), strict=True)
+            if self.counts[topic.name] or not np.nan_to_num(self.effort[:, side]).any()]
         every_tick = [topic.name for topic in (CLOCK, *self.scene.topics) if topic not in held]
         ticks = max(int(self.tick.max(initial=-1)) + 1, *(self.counts[name] for name in every_tick))
         there = sum(self.counts.values())

@@ -71,7 +71,7 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
             written += 1
     finally:
         left_out = [f"{size} bytes from byte {offset} on: {why}" for offset, size, why in opened.storage.left_out]
-        left_out += [f"{count} messages on {name}: not a topic of its scene" for name, count in opened.foreign.items()]
+        left_out += [f"messages on {name}, no topic of its scene: {count}" for name, count in opened.foreign.items()]
         left_out += [f"parts of {len(at)} ticks, the first {at[0]}: {why}" for why, at in refused.items()]
         if recorder is not None:
             recorder.close({"recovered from": str(opened.path), "what was left out": "; ".join(left_out) or "none"})

@@ -2,7 +2,7 @@
 
 The meaning is that of the standard `simulation_interfaces`, whose package is not among the wheels; the types are those
 of std_srvs. Each answers with what the plant is then, as JSON: `state`, `tick` and others; with `goal`, what `status`
-will say when it is done; and if it does nothing, with `why`.
+will say when it is done, and of a step how many were `asked` for; and if it does nothing, with `why`.
 """
 
 from __future__ import annotations
@@ -73,12 +73,13 @@ class Steering:
         if not self._paused:
             return self._answer(response, "not paused; allowed: step of a paused plant")
         if self.steps or self.reset_due:
-            return self._answer(response, f"{self.steps} steps are still to go, or a reset; allowed: one at a time")
+            busy = "a reset is on its way" if self.reset_due else f"{self.steps} steps are still to go"
+            return self._answer(response, f"{busy}; allowed: one step or reset at a time")
         if wanted > left:
             return self._answer(response, f"steps: {wanted} is not allowed; allowed: at most {left}")
         self.steps, goal = wanted, plant.tick + wanted
         plant.loop.advance()
-        return self._answer(response, goal={"tick": goal, "state": PAUSED})
+        return self._answer(response, goal={"tick": goal, "state": PAUSED}, asked=wanted)
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self.reset_due:

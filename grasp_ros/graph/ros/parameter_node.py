@@ -21,7 +21,7 @@ from rclpy.subscription import Subscription
 from grasp_ros.graph.parameters import FREE, PARAMETERS
 from grasp_ros.graph.ros import messages
 from grasp_ros.physics.errors import Refused
-from grasp_ros.scene import Scene
+from grasp_ros.scene import Scene, strict_yaml
 from grasp_ros.scene.suggestion import allowed
 
 FILE = "--params-file"
@@ -134,16 +134,17 @@ class ParameterNode(Node):
                 why = f"no such parameter; {allowed(name, sorted(self._parameters))}"
                 return SetParametersResult(successful=False, reason=f"{name}: {why}")
             held, declared = _plain(self.get_parameter(name).value), self.describe_parameter(name)
-            if declared.dynamic_typing and type(held) in (int, float) and type(parameter.value) in (int, str):
-                with suppress(ValueError):
-                    parameter = RosParameter(name, value=float(parameter.value))
+            value = _plain(parameter.value)
+            if declared.dynamic_typing and type(held) in (int, float) and type(value) in (int, str):
+                with suppress(ValueError, TypeError):
+                    parameter = RosParameter(name, value=float(strict_yaml.load(str(value))))
             if declared.read_only or name == SIM_TIME:
-                if _plain(parameter.value) == held:
+                if value == held:
                     continue
                 why = self.why_read_only if "." in name else ParameterNode.why_read_only
                 return SetParametersResult(successful=False, reason=f"{name}: {why}")
-            if not declared.dynamic_typing and type(parameter.value) is not type(held):
-                why = f"{parameter.value!r} is not allowed; allowed: {KINDS[type(held)]}"
+            if not declared.dynamic_typing and type(value) is not type(held):
+                why = f"{value!r} is not allowed; allowed: {KINDS[type(held)]}"
                 return SetParametersResult(successful=False, reason=f"{name}: {why}")
             numbers.append(parameter)
         return super().set_parameters_atomically(numbers) if numbers else SetParametersResult(successful=True)

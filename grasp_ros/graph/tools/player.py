@@ -11,7 +11,7 @@ from grasp_ros.graph.bag import EmptyBagError
 from grasp_ros.graph.bag.opening import Opened
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
-from grasp_ros.physics.errors import Refused
+from grasp_ros.graph.running import check_factor
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.topics import JOINT_STATES, WINDOW
 
@@ -28,8 +28,7 @@ class Player(GraspNode):
         super().__init__("player", **options)
         bag = Opened(self.read_only("bag"))
         self._rate = self.read_only("rate")
-        if not 0.0 < self._rate < math.inf:
-            raise Refused(f"rate: {self._rate!r} is not allowed; allowed: a number > 0")
+        check_factor(self._rate, "rate")
         begin = []  # up to the first state
         for row in bag.messages:
             begin.append(row)

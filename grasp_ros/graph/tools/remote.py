@@ -111,13 +111,20 @@ class Remote(GraspNode):
 
     def step(self, number: str = "1") -> str:
         """Let a paused plant do some periods."""
-        self._set("plant", "steps", _whole(number))
-        return self.plant("step")
+        wanted = _whole(number)
+        self._set("plant", "steps", wanted)
+        found = self._status("step")
+        if found["asked"] != wanted:
+            raise Failed(f"step {wanted}: somebody else has set {found['asked']} steps meanwhile, which are done")
+        return self._done(found)
 
     def plant(self, name: str) -> str:
         """Call a service of the plant, and wait for what it promises."""
-        found, deadline = self._status(name), time.monotonic() + PATIENCE_SECONDS
-        goal = found.get("goal", {})
+        return self._done(self._status(name))
+
+    def _done(self, found: dict[str, Any]) -> str:
+        """Wait for what an answer of the plant promises."""
+        goal, deadline = found.get("goal", {}), time.monotonic() + PATIENCE_SECONDS
         while not goal.items() <= found.items():
             before, found = found, self._status("status")
             if found != before:
