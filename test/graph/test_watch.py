@@ -223,7 +223,7 @@ def test_whatever_a_bag_says_of_the_energy_is_shown(path: Path, name: str, value
     ("options", "words"),
     [(["--from", "2.5"], "--from: 2.5 is not allowed; allowed: 0 to 2 s"),
      (["--from", "nan"], "--from: nan is not allowed; allowed: 0 to 2 s"),
-     (["--rate", "0"], "--rate: 0.0 is not allowed; allowed: a number > 0")],
+     (["--rate", "0"], "--rate: 0.0 is not allowed; allowed: 1e-06 to 1e+06")],
 )
 def test_what_cannot_be_shown_is_refused(path: Path, command: Any, options: list[str], words: str) -> None:
     found = command("watch", str(path), *options)

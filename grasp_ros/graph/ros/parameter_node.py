@@ -137,7 +137,8 @@ class ParameterNode(Node):
             value = _plain(parameter.value)
             if declared.dynamic_typing and type(held) in (int, float) and type(value) in (int, str):
                 with suppress(ValueError, TypeError):
-                    parameter = RosParameter(name, value=float(strict_yaml.load(str(value))))
+                    value = float(strict_yaml.load(str(value)))
+                    parameter = RosParameter(name, value=value)
             if declared.read_only or name == SIM_TIME:
                 if value == held:
                     continue
