@@ -16,6 +16,7 @@ import numpy as np
 from numba.core.types import float64, int64
 
 from grasp_ros.exact.compilation.jit import COMPILED, address_of_code, code_of_call, inlined, instruction
+from grasp_ros.exact.compilation.reference import Reference
 from grasp_ros.exact.records import Integers, Segment
 
 ADDRESS, CONTEXT = 0, 1  # places of an observer
@@ -62,9 +63,9 @@ def _words(record: Any) -> Iterator[int]:
 def reader(kind: Any) -> Any:
     """A function that kernels call for the record of this type behind an address."""
     def code(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
-        return builder.load(builder.inttoptr(arguments[0], context.get_value_type(kind).as_pointer()))
+        return builder.inttoptr(arguments[0], context.get_value_type(Reference(kind)))
 
-    @instruction(lambda _, address: (kind(int64), code))
+    @instruction(lambda _, address: (Reference(kind)(int64), code))
     def read(address: int) -> Any:
         return _RECORDS[int(address)]
 
