@@ -7,6 +7,7 @@ which was half of what was compiled for an observer.
 from typing import Any
 
 from numba.core import cgutils, types
+from numba.core.types.containers import NamedTuple
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, lower_getattr_generic, models, register_model
 
@@ -22,7 +23,7 @@ class Reference(types.Type):
         """Index and type of a field; a record within it is referred to, too."""
         index = self.record.fields.index(name)
         kind = self.record.types[index]
-        return index, Reference(kind) if isinstance(kind, types.NamedTuple) else kind
+        return index, Reference(kind) if isinstance(kind, NamedTuple) else kind
 
 
 @register_model(Reference)
@@ -39,7 +40,7 @@ class _Fields(AttributeTemplate):
         return reference.field(name)[1]
 
 
-@lower_getattr_generic(Reference)
+@lower_getattr_generic(Reference)  # type: ignore[untyped-decorator]
 def _field(_: Any, builder: Any, reference: Reference, address: Any, name: str) -> Any:
     index, kind = reference.field(name)
     place = cgutils.gep_inbounds(builder, address, 0, index)
