@@ -114,8 +114,8 @@ class Remote(GraspNode):
         wanted = _whole(number)
         self._set("plant", "steps", wanted)
         found = self._status("step")
-        if found["asked"] != wanted:
-            raise Failed(f"step {wanted}: somebody else has set {found['asked']} steps meanwhile, which are done")
+        if (asked := found.get("asked", wanted)) != wanted:
+            raise Failed(f"step {wanted}: somebody else has set {asked} steps meanwhile, which are done")
         return self._done(found)
 
     def plant(self, name: str) -> str:
