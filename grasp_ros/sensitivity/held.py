@@ -40,7 +40,7 @@ def answer(inputs: Inputs, before: Array, moved: Array, side: Body, tick: int, j
     x = before[lane - 1] + row[Column.POSITION_NOISE] * first
     v = before[lane] + row[Column.VELOCITY_NOISE] * second
     force = feedback(row, x, v)
-    limited = math.copysign(1.0, force) * rates[Column.LIMIT, j]
+    limited = math.copysign(1.0, force) * rates[Column.LIMIT, j] if force != 0.0 else 0.0
     if abs(force) > row[Column.LIMIT] or row[Column.LIMIT] == 0.0:
         return limited, False
     away = moved[lane - 1, j] + rates[Column.POSITION_NOISE, j] * first - rates[Column.SET_POINT, j]

@@ -66,15 +66,20 @@ def turning_ratio(motion: TangentMotion, old: float) -> float:
 
 
 @kernel
-def pass_friction(motion: TangentMotion, moved: Array, outputs: TangentOutputs) -> None:
-    """The jump of the tangents where the mode of an object under dry friction has changed."""
+def pass_friction(motion: TangentMotion, moved: Array, outputs: TangentOutputs, at_tick: bool) -> None:
+    """The jump of the tangents where the mode of an object under dry friction has changed.
+
+    Of one that stops just when inputs change nobody knows which of them would act on it.
+    """
     before, now = outputs.counts[Count.SLIDE], motion.mode[OBJECT]
     if now == Slide.FREE or now == before:
         return
-    factor = 1.0
-    if now == Slide.STUCK:
+    factor, slid = 1.0, before == Slide.RIGHTWARD or before == Slide.LEFTWARD
+    if slid and at_tick:
+        factor = math.nan
+    elif now == Slide.STUCK:
         factor = 0.0
-    elif before == Slide.RIGHTWARD or before == Slide.LEFTWARD:
+    elif slid:
         factor = turning_ratio(motion, outputs.numbers[Number.FORCE])
     elif before == UNSEEN and motion.before[V.O] == 0.0:
         for j in range(moved.shape[1]):
@@ -266,8 +271,9 @@ def propagate(address: int, kind: int, span: float, s: float, unit: float, degre
         return 0
     if t.outputs.counts[Count.SLIDE] == UNSEEN:
         check_glide(t.motion, t.rates, t.outputs)
-    pass_friction(t.motion, t.rates.x, t.outputs)
     clock = t.motion.clock
+    since_tick = clock[0] + clock[1] - (0.0 if kind == REST else span)
+    pass_friction(t.motion, t.rates.x, t.outputs, t.outputs.counts[Count.DRIVEN] != 0 and since_tick <= 0.0)
     enter_ticks(t, clock[2])
     t.outputs.numbers[Number.TIME] = (clock[0] + clock[1]) + clock[2]
     if kind == REST:

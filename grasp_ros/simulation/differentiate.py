@@ -51,8 +51,8 @@ class Sensitivity(Frozen):
         the event.
     corner : float or None
         Time in s from which on one-sided derivatives differ, because an object under dry friction turns where it could
-        as well stay, a pair begins at u' = -1/p and nothing moves it off, or a command is just at its limit; None:
-        nowhere.
+        as well stay, or stops just when inputs change, a pair begins at u' = -1/p and nothing moves it off, or a
+        command is just at its limit; None: nowhere. An object that friction just holds, to the last digit, is not told.
     """
 
     scene: Scene

@@ -131,6 +131,15 @@ def test_an_object_that_a_pulse_moves_from_rest(period: float) -> None:
         np.testing.assert_allclose(found, sign * expected, rtol=1e-12, atol=1e-15)
 
 
+def test_an_object_that_stops_just_when_inputs_change_is_flagged() -> None:
+    """It stops after 0.5 s, when the pulse begins to push it back."""
+    scene = made(1.0, 0.1, object=body(v=0.25), object_friction={"coulomb_N": 0.5},
+                 object_pulse={"force_N": -1.0, "start_s": 0.5, "length_s": 0.2})
+    assert derivatives(scene, "object.velocity_m_per_s").corner == pytest.approx(0.5)
+    later = scene.changed({"object_pulse.start_s": 0.6})
+    assert derivatives(later, "object.velocity_m_per_s").corner is None
+
+
 def test_times_at_which_a_force_ends_and_returns_beside_a_stuck_object() -> None:
     scene = made(0.1, 0.01, left_arm=body(1.0, 0.02, stiffness_N_per_m=50.0), object=body(),
                  right_arm=body(10.0, -0.01, stiffness_N_per_m=500.0), object_friction={"coulomb_N": 100.0},
