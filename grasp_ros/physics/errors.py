@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from traceback import extract_tb
 
-OTHERS = re.compile("/lib/python3[^/]*/(?!(site|dist)-packages/(?!rclpy/))")  # files of Python's library, and of rclpy
+OTHERS = re.compile("/lib/python3[^/]*/(?!(site|dist)-packages/(?!(rclpy|numba)/))")  # of Python, rclpy, numba
 LONGEST = 4000  # characters of a sentence
 
 
@@ -15,7 +15,7 @@ def printable(text: str) -> str:
 
 
 def place_of(error: BaseException) -> str:
-    """Where an exception was raised, if possible not in Python's own library or in rclpy: "file, line n"."""
+    """Where an exception was raised, if possible not in Python's own library, rclpy or numba: "file, line n"."""
     places = extract_tb(error.__traceback__)
     place = next((place for place in reversed(places) if not OTHERS.search(place.filename)), places[-1])
     return f"{place.filename}, line {place.lineno}"
@@ -40,3 +40,7 @@ class Refused(ValueError):  # noqa: N818 - it is what happens to the input, and 
         if len(sentence) > LONGEST:
             sentence = f"{sentence[: LONGEST // 2]} ... {sentence[-LONGEST // 2 :]}"
         super().__init__(printable(sentence))
+
+
+class Failed(Refused):
+    """What was accepted and has failed: nobody answers, a law of the user's gives no command."""

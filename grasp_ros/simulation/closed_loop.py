@@ -17,7 +17,7 @@ from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Loop, new_place, one_interval
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.registry import METHODS
-from grasp_ros.physics.control import ControlLaw, Law
+from grasp_ros.physics.control import FIXED, ControlLaw, Law
 from grasp_ros.physics.domain import LARGEST_POSITION, LARGEST_SPEED
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import mapping, names, plain
@@ -60,14 +60,14 @@ def check_changes(scene: Scene, held: bool, changes: Changes, by_user: Iterable[
         return
     if not held:
         raise Refused("changes: not allowed under continuous feedback; allowed: sampled=True")
-    live, replaced = scene.live, tuple(f"{side}_feedback." for side in by_user)
+    live, replaced = scene.live, scene.numbers_of(*(f"{side}_controller" for side in by_user))
     for tick, numbers in changes.items():
         at, where = plain(tick), f"changes: at tick {tick!r}"
         if at is None or not (0 <= at <= scene.ticks and at == int(at)):
             raise Refused(f"{where} is not allowed; allowed: 0 to {scene.ticks}")
         for name in names(where, [*mapping(where, numbers)]):
-            if name.startswith(replaced):
-                raise Refused(f"changes: {name} at tick {tick!r}: another controller acts in place of this feedback")
+            if name in replaced:
+                raise Refused(f"changes: {name} at tick {tick!r}: {FIXED}")
             if name not in live:
                 raise Refused(f"changes: {name} at tick {tick!r}; allowed: {', '.join(live)}")
 

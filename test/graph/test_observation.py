@@ -18,6 +18,7 @@ from grasp_ros.graph.bag.recording import Recording
 from grasp_ros.graph.bag.verify import verify
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.processes import Graph
+from grasp_ros.physics import control
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
@@ -108,7 +109,7 @@ def test_a_node_refuses_a_scene_without_what_its_law_asks_for_and_numbers_that_d
     controller._take(scenes.load("case_01"))
     gain = "left_feedback.position_gain_N_per_m"
     result = controller.set_parameters([Parameter(gain, value=9.0)])[0]
-    assert result.reason == f"{gain}: another controller acts in place of this feedback"
+    assert result.reason == f"{gain}: {control.FIXED}"
     assert controller.set_parameters([Parameter(gain, value=5.0)])[0].successful
     end_nodes(controller)
 

@@ -193,6 +193,7 @@ def test_what_a_controller_raises_passes_through_with_its_tick(compiled: bool) -
         (numba.njit(answers_nan), "answered nan at tick 7, t = 0.007 s; allowed: a finite number of N"),
         (lambda *_: "much", "answered 'much' at tick 0, t = 0.0 s; allowed: a finite number of N"),
         (lambda *_: None, "answered None at tick 0"),
+        (numba.njit(lambda tick, time, x, v: 1.0 if tick < 3 else None), "answered None at tick 3"),
         (lambda *_: np.zeros(1), "answered array"),
         (lambda *_: -math.inf, "answered -inf"),
         (numba.njit(lambda tick, time, x, v: "much"), "float(int, float, float, float): No conversion from "),
@@ -216,8 +217,10 @@ def test_a_side_without_an_arm_is_refused(side: str) -> None:
 
 def test_a_change_of_feedback_that_does_not_act_is_refused() -> None:
     change = {5: {"left_feedback.position_gain_N_per_m": 9.0}}
-    with pytest.raises(Refused, match="another controller acts"):
-        simulate(scenes.load("case_01"), sampled=True, changes=change, controllers={"left": paper})
+    limit = {5: {"left_actuator.limit_N": 1.0}}
+    for name, refused in (("case_01", change), ("saturation", limit)):
+        with pytest.raises(Refused, match=control.FIXED):
+            simulate(scenes.load(name), sampled=True, changes=refused, controllers={"left": paper})
     for tick in (1.5, -1, "1", 20_001):
         for numbers in (change[5], {}):
             with pytest.raises(Refused, match=r"changes: at tick .* allowed: 0 to 20000"):

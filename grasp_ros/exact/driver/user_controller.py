@@ -19,11 +19,12 @@ import numba
 from numba.core.ccallback import CFunc
 from numba.core.errors import NumbaError
 from numba.core.types import float64, int64
+from numba.core.types.misc import Optional
 from numba.extending import is_jitted
 
 from grasp_ros.exact.compilation.jit import code_of_call, instruction
 from grasp_ros.physics.control import Law, command_of
-from grasp_ros.physics.errors import Refused, described
+from grasp_ros.physics.errors import Failed, Refused, described
 from grasp_ros.physics.observation import Observation, asked
 
 SIGNATURE = float64(int64, float64, float64, float64)
@@ -39,8 +40,14 @@ def call(address: int, tick: int, time: float, x: float, v: float) -> float:
 
 @lru_cache(maxsize=64)
 def _compiled(law: Any) -> Any:
-    """A C function that answers NaN where the law raises, which is not for a kernel to hear about."""
+    """A C function that answers NaN where the law raises, which is not for a kernel to hear about.
+
+    None for a law that may answer None: C would be given a 0.
+    """
     inner = numba.njit(law.__wrapped__) if isinstance(law, CFunc) else law
+    inner.compile(SIGNATURE.args)
+    if isinstance(inner.overloads[SIGNATURE.args].signature.return_type, Optional):
+        return None
 
     def command(tick, time, x, v):  # type: ignore[no-untyped-def]  # numba infers its types
         try:
@@ -83,20 +90,20 @@ class UserController:
         self.asks = asked(law)
         self.observe: Callable[[int], Observation]
         numba_law = is_jitted(law) or isinstance(law, CFunc)
-        named, compiled = getattr(law, "__wrapped__", law) if numba_law else law, numba_law and not self.asks
+        named = getattr(law, "__wrapped__", law) if numba_law else law
         named = named if hasattr(named, "__qualname__") else type(named)
         self.name = f"{named.__module__}:{named.__qualname__}"
         self._who, self._law = f"{side} controller {self.name}", law
         self._error: BaseException | None = None
         try:
-            function: Any = _compiled(law) if compiled else PROTOTYPE(self._answer)
+            function: Any = _compiled(law) if numba_law and not self.asks else None
         except NumbaError as error:
             lines = [line.strip() for line in COLOUR.sub("", str(error)).splitlines()]
             why = next((line for line in lines if line and not line.startswith(BESIDE)), type(error).__name__)
             raise Refused(f"controllers: {side}: {self.name} cannot be compiled as"
                           f" float(int, float, float, float): {why}") from None
-        self._function = function  # which must not go before the address does
-        self.address: int = function.address if compiled else ctypes.cast(function, ctypes.c_void_p).value or 0
+        self._function = function or PROTOTYPE(self._answer)  # which must not go before the address does
+        self.address: int = function.address if function else ctypes.cast(self._function, ctypes.c_void_p).value or 0
 
     def _answer(self, tick: int, time: float, x: float, v: float) -> float:
         """What a callable of Python answers; NaN for what is kept for `failure`."""
@@ -116,9 +123,11 @@ class UserController:
             except BaseException as again:
                 error = again
         if error is None:
-            return Refused(f"{self._who}: no finite command at tick {tick}, t = {time!r} s")
-        if isinstance(error, (SystemExit, GeneratorExit)):  # which would end who called us, as if all were done
-            error = Refused(f"{self._who}: {described(error)}, tick {tick}, t = {time!r} s")
-        elif not isinstance(error, Refused):
-            error.add_note(f"{self._who}, tick {tick}, t = {time!r} s")
+            return Failed(f"{self._who}: no finite command at tick {tick}, t = {time!r} s")
+        if isinstance(error, Refused) and str(error).startswith(self._who):
+            return Failed(str(error))
+        if isinstance(error, Refused) or not isinstance(error, (Exception, KeyboardInterrupt)):
+            # An exit would end who called us, as if all were done.
+            return Failed(f"{self._who}: {described(error)}, tick {tick}, t = {time!r} s")
+        error.add_note(f"{self._who}, tick {tick}, t = {time!r} s")
         return error

@@ -17,7 +17,7 @@ from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.messages import State, StateReader
 from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.serialization import list_message, template_of
-from grasp_ros.physics.control import command_of, limited
+from grasp_ros.physics.control import FIXED, command_of, limited
 from grasp_ros.physics.errors import Refused, described
 from grasp_ros.physics.observation import Observation, asked, check
 from grasp_ros.physics.system import COLUMN, NAMES, System
@@ -125,9 +125,9 @@ class Controller(PeerNode):
         return SetParametersResult(successful=True)
 
     def _check_own(self, numbers: Mapping[str, Any]) -> None:
-        """Refuse other numbers of a feedback that does not act: neither a bag nor a run without ROS would have them."""
+        """Refuse other numbers beside a law of the user's: neither a bag nor a run without ROS would have them."""
         if self._own and numbers:
-            raise SceneError(f"{', '.join(numbers)}: another controller acts in place of this feedback")
+            raise SceneError(f"{', '.join(numbers)}: {FIXED}")
 
     def _stage(self, parameters: list[Parameter]) -> None:
         """Let numbers that were set act from the next state on."""

@@ -26,7 +26,7 @@ from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.graph.ros.parameter_node import refusing
 from grasp_ros.graph.stopping import note_signals, on_signals
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Failed, Refused
 from grasp_ros.scene import strict_yaml
 from grasp_ros.scene.suggestion import allowed
 from grasp_ros.scene.topics import Topic
@@ -36,10 +36,6 @@ SPIN_SECONDS = 0.1
 MOST_DIGITS = 20  # of a whole number; a plant refuses those that it cannot do itself
 FAREWELL = ("quit", "exit", "q")
 HELP = "pause, resume, step [N], reset, status, get NODE [NAME ...], set NODE NAME VALUE, echo TOPIC [N]"
-
-
-class Failed(Refused):
-    """Nobody answers, or does what was asked for."""
 
 
 class Remote(GraspNode):
