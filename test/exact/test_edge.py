@@ -29,7 +29,7 @@ from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.kinematics import other
 from grasp_ros.exact.records import Deciding, Plant, State
 from grasp_ros.exact.tolerances import DERIVATIVE, SURFACE
-from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Of, Pair, Slide, U, Work
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Of, Pair, Slide, U, Work, X
 from grasp_ros.physics.model import Contact
 from lab.reference.grasp import Grasp, system_of
 
@@ -213,16 +213,17 @@ def test_a_wall_hands_no_force_on(side: Body) -> None:
 @pytest.mark.parametrize(
     ("own", "beside", "expected"),
     [
-        ({}, {"d": 0.3}, (UNDECIDED, math.inf)),  # its force will press this pair
-        ({}, {"push": 1.0}, (UNDECIDED, math.inf)),
-        ({}, {"d": -0.3}, (UNDECIDED, math.inf)),
+        ({}, {"d": 0.3}, (3.5, math.inf)),  # its force will press this pair, with t^(3/2)
+        ({}, {"push": 1.0}, (5.0, 6.0 * 1e4 * 0.5**1.5)),  # 1e4 (t^2 / 2)^(3/2), differentiated three times
+        ({}, {"d": -0.3}, (3.5, math.inf)),
         ({}, {}, (NEVER, 0.0)),
         ({"push": 1.0}, {"d": 0.3}, (2.0, 1.0)),
         ({"push": -1.0}, {"d": 0.3}, (2.0, -1.0)),
         ({"push": 1.0}, {"push": 1.0}, (2.0, 1.0)),
         ({"speed": 0.5, "stiffness": 2.0}, {"d": 0.3}, (3.0, -1.0)),
         ({"speed": 0.5, "stiffness": 2.0}, {"push": 1.0}, (3.0, -1.0)),
-        ({"common": 1.0, "stiffness": 2.0}, {"d": 0.3}, (4.0, -2.0)),
+        ({"common": 1.0, "stiffness": 2.0}, {"d": 0.3}, (3.5, math.inf)),  # of its own: (4.0, -2.0), which is later
+        ({"common": 1.0, "stiffness": 2.0}, {"push": 1.0}, (4.0, -2.0)),
     ],
 )
 def test_beside_a_pair_that_begins_at_zero(
@@ -232,7 +233,21 @@ def test_beside_a_pair_that_begins_at_zero(
     b = bench(side, 0.0, 0.0, beside=(0.0, beside.get("d", 0.0)), beside_mode=Pair.CONTACT,
               push=own.get("push", 0.0) + common, object_push=common, beside_push=common - beside.get("push", 0.0),
               stiffness=own.get("stiffness", 0.0), object_speed=own.get("speed", 0.0))
-    assert deciding_derivative(b.plant, b.state, side) == expected
+    assert deciding_derivative(b.plant, b.state, side) == pytest.approx(expected, rel=1e-15)
+
+
+@SIDES
+@pytest.mark.parametrize(("common", "expected"), [(0.0, 8.0), (1.0, 6.0), (5.0, -2.0)])
+def test_a_force_that_begins_at_the_surface_by_the_third_derivative_adds_to_the_fourth(
+    side: Body, common: float, expected: float
+) -> None:
+    """The jerk of the other arm is 1.6 m/s^3, away from u' = -1/p: 10 N 0.5 1.6; its own is -2 `common`."""
+    b = bench(side, 0.0, 0.0, beside=(0.01, -2.0), beside_mode=Pair.CONTACT, p=0.5, push=common, object_push=common,
+              beside_push=common, stiffness=2.0)
+    far, lane = (RIGHT, X.R) if side == LEFT else (LEFT, X.L)
+    b.plant.bodies[far, Of.STIFFNESS] = 0.8
+    b.plant.bodies[far, Of.FORCE] += 0.8 * b.state.y[lane]
+    assert deciding_derivative(b.plant, b.state, side) == pytest.approx((4.0, expected))
 
 
 # How long the sign is certain.

@@ -24,11 +24,13 @@ from grasp_ros.exact.numerics.roots import first_rise
 from grasp_ros.exact.records import Array, Deciding, Integers, Plant, State
 from grasp_ros.exact.tolerances import CLAMPS, DERIVATIVE, SHORT_START, SURFACE, TURNS
 from grasp_ros.physics.domain import RANGES
+from grasp_ros.physics.impact_law import EXPONENT
 from grasp_ros.physics.layout import OBJECT, Body, Law, Of, Pair, U, V, X
 
 LOWEST, NEXT, HIGHEST = (whole(order) for order in (2, 3, 6))  # int64: numba compiles anew for each literal
 LONGEST = RANGES["duration"].high  # s
 UNDECIDED, NEVER = 0.0, math.inf  # orders if no derivative decides
+GROWTH = math.gamma(2.0 * EXPONENT + 1.0)  # its derivative of the order 2 EXPONENT is this times t^(2 EXPONENT)
 
 
 @kernel
@@ -52,18 +54,40 @@ def deciding_derivative(plant: Plant, state: State, side: Body) -> Deciding:
     """The first derivative of u of a pair at rest that differs from zero by more than its rounding.
 
     If the other contact pushes, its force and the rate of its force are part of the derivatives 2 and 3, and no higher
-    one is known. If the other pair is going to push, and no derivative of this one differs from zero, that force will
-    close it.
+    one is known. If it has no force yet, see `coming_push`, it closes this pair unless a lower derivative decides.
     """
-    y, beside = state.y, other(side)
-    closed = state.mode[beside] in (Pair.CONTACT, Pair.BEGINNING) and plant.bodies[OBJECT, Of.MASS] < math.inf
-    if closed and state.mode[beside] == Pair.CONTACT and y[U.L + beside] > 0.0:
+    beside = other(side)
+    presses = state.mode[beside] == Pair.CONTACT and state.y[U.L + beside] > 0.0
+    moves = plant.bodies[OBJECT, Of.MASS] < math.inf
+    if moves and presses and surface_factor(plant.pairs, state.y, beside, SURFACE) != 0.0:
         push, pace = other_push(plant, state, side)
-        found = first_difference(plant, y, side, push, pace, NEXT)
+        found = first_difference(plant, state.y, side, push, pace, NEXT)
         return found if found.order < NEVER else Deciding(UNDECIDED, 0.0)
-    found = own_difference(plant, y, side)
-    begins = closed and (approach(y, beside) != 0.0 or own_difference(plant, y, beside).order < NEVER)
-    return Deciding(UNDECIDED, math.inf) if found.order == NEVER and begins else found
+    own = own_difference(plant, state.y, side)
+    order, push = coming_push(plant, state, beside) if moves else (NEVER, 0.0)
+    if own.order < order or order == NEVER:
+        return own
+    return Deciding(order, push + own.value if own.order == order else push)
+
+
+@kernel
+def coming_push(plant: Plant, state: State, beside: Body) -> tuple[float, float]:
+    """Which derivative of u of the other pair a pair without a force yet moves first: order, or NEVER, and value.
+
+    The force of a pair that closes from u = 0, by the power n of the time, grows with 3 n / 2; that of one at u' = -1/p
+    with u' + 1/p. Orders that are not whole have the value inf.
+    """
+    y, mode, pair, mass = state.y, state.mode[beside], plant.pairs[beside], plant.bodies[OBJECT, Of.MASS]
+    if mode not in (Pair.CONTACT, Pair.BEGINNING):
+        return NEVER, 0.0
+    u, (order, value) = y[U.L + beside], own_difference(plant, y, beside)
+    if mode == Pair.CONTACT and u > 0.0:
+        return order + 1.0, elastic_force(pair[Law.HERTZIAN], u) * pair[Law.DISSIPATION] * value / mass
+    if approach(y, beside) != 0.0:
+        order = 1.0
+    at_rest = order == LOWEST
+    push = GROWTH * elastic_force(pair[Law.HERTZIAN], max(0.5 * value, 0.0)) / mass if at_rest else math.inf
+    return EXPONENT * order + 2.0, push
 
 
 @kernel
@@ -186,10 +210,11 @@ def keeps_rate(plant: Plant, state: State, side: Body) -> bool:
 def glides(plant: Plant, state: State, side: Body) -> bool:
     """Whether nothing moves a pair off u' = -1/p: neither its own motion nor a push of the other pair.
 
-    The other one has no force, or glides as well: in a symmetric grasp both are treated alike at one instant.
+    The other one has no force, or glides as well: in a symmetric grasp both are treated alike at one instant. One that
+    begins is going to push.
     """
     beside = other(side)
-    if not keeps_rate(plant, state, side):
+    if state.mode[beside] == Pair.BEGINNING or not keeps_rate(plant, state, side):
         return False
     if state.mode[beside] == Pair.CONTACT and surface_factor(plant.pairs, state.y, beside, SURFACE) != 0.0:
         return False

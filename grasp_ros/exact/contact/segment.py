@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.automaton.begin import leaves_force_out, speed_of_pair
-from grasp_ros.exact.automaton.edge import LOWEST, difference, other_push
+from grasp_ros.exact.automaton.edge import LOWEST, deciding_derivative, difference, other_push
 from grasp_ros.exact.automaton.friction import slide_in_contact
 from grasp_ros.exact.compensated import add, keep_together, move_arm_in_contact, move_in_flight
 from grasp_ros.exact.compilation.jit import inlined, kernel, whole
@@ -39,6 +39,7 @@ from grasp_ros.physics.layout import (
 )
 
 ALONE = whole(-1)  # no second lane
+FIRST = whole(0)  # coefficient
 MOST_HALVINGS = 64  # of a step
 
 
@@ -70,7 +71,7 @@ def pair_candidate(tables: Tables, plant: Plant, state: State, n: int, side: Bod
     if mode == Pair.OPEN:
         if c[z] <= 0.0 and high < 0.0:
             return Candidate(math.inf, Transition.TOUCH)
-        return Candidate(rise_of_lanes(tables, n, h, 1.0, z, ALONE, 0.0, work), Transition.TOUCH)
+        return Candidate(touch_of_open(tables, plant, state, n, side, h, work), Transition.TOUCH)
     released = math.inf
     if not (c[z] >= 0.0 and low > 0.0):
         released = rise_of_lanes(tables, n, h, -1.0, z, ALONE, 0.0, work)
@@ -78,6 +79,23 @@ def pair_candidate(tables: Tables, plant: Plant, state: State, n: int, side: Bod
             return Candidate(released, Transition.RELEASE)
     crossed, kind = surface_candidate(tables, plant, state, n, side, min(h, released), work)
     return Candidate(released, Transition.RELEASE) if crossed >= released else Candidate(crossed, kind)
+
+
+@kernel
+def touch_of_open(tables: Tables, plant: Plant, state: State, n: int, side: Body, h: float, work: Integers) -> float:
+    """First s in (0, h] at which u of a pair without contact rises through zero.
+
+    Where a pair at u = u' = 0 opens, coefficients that say otherwise before the one that opens it are roundings.
+    """
+    row = tables.row
+    for k in range(n + 1):
+        row[k] = tables.c[LANES * k + Z.L + side]
+    if is_resting(state.y, side) and deciding_derivative(plant, state, side).value < 0.0:
+        for k in range(n + 1):
+            if row[k] < 0.0:
+                break
+            row[k] = 0.0
+    return first_rise(row, n, h, EPS * abs(row[FIRST]), work)
 
 
 @inlined
