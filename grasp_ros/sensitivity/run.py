@@ -41,26 +41,26 @@ class Carrier:
 
     def __init__(self, integrator: Integrator, directions: Directions, times: Array, e: int = 0) -> None:
         self._tangents = tangents_of(integrator.plant, integrator.records, directions, times, e)
-        rates, outputs = self._tangents.rates, self._tangents.outputs
-        self.x, self.out, self.forces = rates.x[:, : directions.state.shape[1]], outputs.out, outputs.forces
+        self.x = self._tangents.x[:, : directions.state.shape[1]]
+        self.out, self.forces = self._tangents.out, self._tangents.forces
 
     def drive_by(self, scene: Scene, directions: Directions, sampled: bool) -> None:
         """Let inputs change at ticks: commands that are held, and external forces."""
-        outputs, system = self._tangents.outputs, scene.system
-        outputs.counts[Count.DRIVEN], outputs.numbers[Number.PERIOD] = 1, scene.time_of(1)
+        system = scene.system
+        self._tangents.counts[Count.DRIVEN], self._tangents.numbers[Number.PERIOD] = 1, scene.time_of(1)
         if sampled:
             normals = np.zeros((scene.ticks + 1, 2, 2))
             for side, law in system.laws.items():
                 if law.seed is not None:
                     normals[:, side] = normals_over(law.seed, 0, scene.ticks + 1)
-            self._tangents = self._tangents._replace(inputs=self._tangents.inputs._replace(
+            self._tangents = self._tangents._replace(
                 control=system.law_rows, control_rates=directions.laws, normals=normals,
-                waiting=np.zeros((system.delay, 2, self.x.shape[1]))))
+                waiting=np.zeros((system.delay, 2, self.x.shape[1])))
 
     def attach(self, tables: Tables) -> Integers:
         """What a run with this workspace calls after each segment."""
-        if tables.c is not self._tangents.motion.c:  # a run in many pieces brings the same ones
-            self._tangents = self._tangents._replace(motion=self._tangents.motion._replace(c=tables.c))
+        if tables.c is not self._tangents.c:  # a run in many pieces brings the same ones
+            self._tangents = self._tangents._replace(c=tables.c)
             self._block = block_of(self._tangents)
         return np.array([address_of(propagate), self._block.ctypes.data])
 
@@ -72,5 +72,5 @@ class Carrier:
     @property
     def corner(self) -> float | None:
         """First time in s at which one-sided derivatives differ; None: there is none."""
-        corner = float(self._tangents.outputs.numbers[Number.CORNER])
+        corner = float(self._tangents.numbers[Number.CORNER])
         return corner if math.isfinite(corner) else None
