@@ -24,7 +24,8 @@ from grasp_ros.physics.layout import Entry, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene, compose
 from grasp_ros.sensitivity.directions import directions
-from grasp_ros.simulation.differentiate import carry, complete
+from grasp_ros.sensitivity.run import Carrier
+from grasp_ros.simulation.differentiate import complete
 from grasp_ros.simulation.sampled_plant import SampledPlant
 from grasp_ros.simulation.ticks import tick_of
 
@@ -189,7 +190,7 @@ def motion(data: Measured, scene: Scene, keys: Sequence[str], rows: int) -> tupl
     times, recorded = data.t[:rows], data.inputs is not None
     scene = _plant(scene) if recorded else _until(scene, times)
     integrator = Integrator(scene.system, continuous=not data.sampled, max_work=WORK + WORK_OF_TICK * scene.ticks)
-    carrier = carry(scene, integrator, directions(scene, keys, data.sampled), times, data.sampled)
+    carrier = Carrier(scene, integrator, directions(scene, keys, data.sampled), times, data.sampled)
     if data.inputs is None:
         states = complete(scene, integrator, data.sampled, times)
     else:
