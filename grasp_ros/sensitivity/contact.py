@@ -136,31 +136,17 @@ def expand_tangents(t: Tangents, n: int) -> None:
 
 @kernel
 def step_tangents(t: Tangents, n: int, s: float) -> None:
-    """Write the tangents of the bodies in contact at s of a step, whose series are there, to `at`.
-
-    All six are summed, so that none waits for another; those of a body that flies are old, and are not written.
-    """
+    """Write the tangents of the bodies in contact at s of a step, whose series are there, to `at`."""
     for block in range(t.x.shape[1] // HALF):
-        x_l = v_l = x_o = v_o = x_r = v_r = spread_half(0.0)
-        for i in range(BLOCK * block + STEP * n, BLOCK * block - STEP, -STEP):
-            x_l = add_product(load_half(t.series, i + HALF * X.L), x_l, s)
-            v_l = add_product(load_half(t.series, i + HALF * V.L), v_l, s)
-            x_o = add_product(load_half(t.series, i + HALF * X.O), x_o, s)
-            v_o = add_product(load_half(t.series, i + HALF * V.O), v_o, s)
-            x_r = add_product(load_half(t.series, i + HALF * X.R), x_r, s)
-            v_r = add_product(load_half(t.series, i + HALF * V.R), v_r, s)
-        store_body(t.at, block, OBJECT, x_o, v_o)
-        if touches(t, LEFT):
-            store_body(t.at, block, LEFT, x_l, v_l)
-        if touches(t, RIGHT):
-            store_body(t.at, block, RIGHT, x_r, v_r)
-
-
-@inlined
-def store_body(at: Array, block: int, body: Body, x: Array, v: Array) -> None:
-    """Write the tangents of a body, of four directions."""
-    store(at[velocity_lane(body) - 1], HALF * block, x)
-    store(at[velocity_lane(body)], HALF * block, v)
+        for body in (LEFT, OBJECT, RIGHT):
+            lane, x, v = velocity_lane(body), spread_half(0.0), spread_half(0.0)
+            if not touches(t, body):
+                continue
+            for i in range(BLOCK * block + STEP * n + HALF * lane, BLOCK * block + HALF * lane - 1, -STEP):
+                x = add_product(load_half(t.series, i - HALF), x, s)
+                v = add_product(load_half(t.series, i), v, s)
+            store(t.at[lane - 1], HALF * block, x)
+            store(t.at[lane], HALF * block, v)
 
 
 @kernel
