@@ -96,15 +96,6 @@ def watch_rest(segment: SegmentRecord, seen: Array, wanted: int) -> None:
 
 
 @kernel
-def watch_level(m: Memory) -> None:
-    """Keep the largest rise of V_c, as it is at the ends of segments."""
-    seen = m.seen
-    seen[Seen.LEVEL] = level(m.loop, m.pairs, m.y)
-    seen[Seen.RISE] = max(seen[Seen.RISE], seen[Seen.LEVEL] - seen[Seen.LEAST])
-    seen[Seen.LEAST] = min(seen[Seen.LEAST], seen[Seen.LEVEL])
-
-
-@kernel
 def begin(m: Memory, bound: float) -> None:
     """Forget the last run, and remember the state at which this one begins."""
     seen, y = m.seen, m.y
@@ -164,7 +155,9 @@ def observe(address: int, kind: int, t: float, s: float, unit: float, degree: in
     if m.switches[Switch.LOSSES] != 0:
         call(m.switches[Switch.LOSSES], address, kind, t, s, unit, degree)
     if wanted & Wanted.RISE.value:
-        watch_level(m)
+        seen[Seen.LEVEL] = level(m.loop, m.pairs, m.y)
+        seen[Seen.RISE] = max(seen[Seen.RISE], seen[Seen.LEVEL] - seen[Seen.LEAST])
+        seen[Seen.LEAST] = min(seen[Seen.LEAST], seen[Seen.LEVEL])
     for place in range(STATES):
         m.before[place] = m.y[place]
     return 0
