@@ -115,17 +115,6 @@ def begin(m: Memory, bound: float) -> None:
             seen[Seen.OUTSIDE + body] = math.inf
 
 
-@kernel
-def finish(m: Memory) -> None:
-    """At the end of a run: keep the last times outside the bound, and find when all bodies settled."""
-    seen = m.seen
-    if m.switches[Switch.WANTED] & Wanted.BOUND.value:
-        for body in (LEFT, OBJECT, RIGHT):
-            seen[Seen.LAST_OUTSIDE + body] = seen[Seen.OUTSIDE + body]
-    if m.switches[Switch.CERTAIN] != 0:
-        seen[Seen.SETTLED] = settled_from(m, level(m.loop, m.pairs, m.y))
-
-
 @door
 def observe(address: int, kind: int, t: float, s: float, unit: float, degree: int) -> int:
     """Remember what is wanted of a segment of t s, which has just ended; called by `callback.notify`.
@@ -134,13 +123,17 @@ def observe(address: int, kind: int, t: float, s: float, unit: float, degree: in
     FINISH, and with REST where nothing moves.
     """
     m = memory_at(address)
+    segment, seen, wanted = SegmentRecord(kind, t, s, degree, m), m.seen, m.switches[Switch.WANTED]
     if kind == BEGIN:
         begin(m, t)
         return 0
     if kind == FINISH:
-        finish(m)
+        if wanted & Wanted.BOUND.value:
+            for body in (LEFT, OBJECT, RIGHT):
+                seen[Seen.LAST_OUTSIDE + body] = seen[Seen.OUTSIDE + body]
+        if m.switches[Switch.CERTAIN] != 0:
+            seen[Seen.SETTLED] = settled_from(m, level(m.loop, m.pairs, m.y))
         return 0
-    segment, seen, wanted = SegmentRecord(kind, t, s, degree, m), m.seen, m.switches[Switch.WANTED]
     if kind == REST:
         watch_rest(segment, seen, wanted)
         return 0

@@ -40,15 +40,6 @@ def impact_now(t: Tangents, side: Body) -> float:
 
 
 @kernel
-def turning_ratio(t: Tangents, old: float) -> float:
-    """Acceleration of an object after it turns, by that before, under its constant force before; nan: it had none."""
-    push, new = impact_now(t, LEFT) - impact_now(t, RIGHT), t.bodies[OBJECT]
-    push -= new[Of.STIFFNESS] * t.before[X.O] + new[Of.DAMPING] * t.before[V.O]
-    first = push + old
-    return (push + new[Of.FORCE]) / first if first != 0.0 else math.nan
-
-
-@kernel
 def pass_friction(t: Tangents, at_tick: bool) -> None:
     """The jump of the tangents where the mode of an object under dry friction has changed.
 
@@ -63,7 +54,10 @@ def pass_friction(t: Tangents, at_tick: bool) -> None:
     elif now == Slide.STUCK:
         factor = 0.0
     elif slid:
-        factor = turning_ratio(t, t.numbers[Number.FORCE])
+        push, new = impact_now(t, LEFT) - impact_now(t, RIGHT), t.bodies[OBJECT]
+        push -= new[Of.STIFFNESS] * t.before[X.O] + new[Of.DAMPING] * t.before[V.O]
+        first = push + t.numbers[Number.FORCE]  # under the constant force before
+        factor = (push + new[Of.FORCE]) / first if first != 0.0 else math.nan
     elif before == UNSEEN and t.before[V.O] == 0.0:
         for j in range(t.x.shape[1]):
             if t.x[V.O, j] != 0.0:
