@@ -40,10 +40,9 @@ FLOOR = 1e-9  # of the spread of a channel, or of others of its kind where it st
 
 
 class FitProblem(NamedTuple):
-    """What is searched: numbers of a scene that let its motion be the measured one."""
+    """What is searched: numbers of the scene of the data that let its motion be the measured one."""
 
     data: Measured
-    scene: Scene
     numbers: tuple[Number, ...]
     noise: Array  # (6,) standard deviation of each channel
 
@@ -65,7 +64,7 @@ class FitProblem(NamedTuple):
     def scene_at(self, y: Array) -> Scene:
         """The scene with the free numbers; outside its domain it is refused."""
         free = zip(self.numbers, self.values(y).items(), strict=True)
-        return self.scene.changed({key: value for number, (key, value) in free if number.channel is None})
+        return self.data.scene.changed({key: value for number, (key, value) in free if number.channel is None})
 
     def predict(self, y: Array, rows: int) -> tuple[Array, Array, Array]:
         """What is measured of the motion (rows, 6), its derivatives by y (rows, 6, n), and its touches.
@@ -110,8 +109,8 @@ def search(problem: FitProblem) -> Array:
             break
     if not math.isfinite(least):
         start = ", ".join(f"{key} {value:g}" for key, value in problem.values(begin).items())
-        raise Refused(f"{problem.data.name}: {start}: with these starts no run of {problem.scene.name} reaches its end;"
-                      " allowed: others")
+        raise Refused(f"{problem.data.name}: {start}: with these starts no run of {problem.data.scene.name} reaches its"
+                      " end; allowed: others")
     return best
 
 
