@@ -9,7 +9,7 @@ from grasp_ros.accuracy.measure import Record
 from grasp_ros.accuracy.truth import Truth
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import canvas
-from grasp_ros.simulation.canvas import Axes, Figure, colormaps
+from grasp_ros.simulation.canvas import Figure, colormaps
 
 COLORS, MARKS = "tab20", "osD^v<>Pp*hX8"
 CHOSEN = "#d55e00"
@@ -20,7 +20,14 @@ def error_against_time(scene: Scene, truth: Truth, records: Sequence[Record], ad
     """A figure of all sound records, with the limit of what can be known, what is wanted, and the choice."""
     with canvas.style():
         figure, axes = canvas.subplots(figsize=(8.0, 5.2))
-        _draw_methods(axes, truth, records)
+        colors = colormaps[COLORS]
+        for place, (name, group) in enumerate(by_method(record for record in records if record.sound).items()):
+            axes.loglog([record.error for record in group], [1e3 * record.time for record in group], label=name,
+                        color=colors(place % 20), marker=MARKS[place % len(MARKS)], markersize=5, linewidth=1.0)
+        axes.axvspan(axes.get_xlim()[0], truth.uncertainty, color="0.9", zorder=0)
+        axes.axvline(truth.uncertainty, color="0.5", linewidth=0.8)
+        axes.annotate(" not known better\n in double precision", (truth.uncertainty, 1.0), va="top", fontsize="x-small",
+                      xycoords=("data", "axes fraction"), color="0.4")
         if error is not None:
             axes.axvline(error, color=CHOSEN, linewidth=0.8, linestyle="--")
         if budget is not None:
@@ -35,15 +42,3 @@ def error_against_time(scene: Scene, truth: Truth, records: Sequence[Record], ad
         axes.grid(alpha=0.3)
         axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize="small", frameon=False)
     return figure
-
-
-def _draw_methods(axes: Axes, truth: Truth, records: Sequence[Record]) -> None:
-    """A line for each method, and where nothing can be known."""
-    colors = colormaps[COLORS]
-    for place, (name, group) in enumerate(by_method(record for record in records if record.sound).items()):
-        axes.loglog([record.error for record in group], [1e3 * record.time for record in group], label=name,
-                    color=colors(place % 20), marker=MARKS[place % len(MARKS)], markersize=5, linewidth=1.0)
-    axes.axvspan(axes.get_xlim()[0], truth.uncertainty, color="0.9", zorder=0)
-    axes.axvline(truth.uncertainty, color="0.5", linewidth=0.8)
-    axes.annotate(" not known better\n in double precision", (truth.uncertainty, 1.0), va="top", fontsize="x-small",
-                  xycoords=("data", "axes fraction"), color="0.4")

@@ -70,7 +70,7 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
     if samples < len(numbers) + FEWEST:
         raise Refused(f"{found.name}: {samples} measured numbers; allowed for {len(numbers)} free ones: at least"
                       f" {len(numbers) + FEWEST}")
-    return _result(fitted(FitProblem(found, found.scene, numbers, first_noise(found))), against)
+    return _result(fitted(FitProblem(found, numbers, first_noise(found))), against)
 
 
 def _result(problem: FitProblem, against: Mapping[str, float]) -> Fit:

@@ -24,7 +24,8 @@ from grasp_ros.physics.layout import Entry, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene, compose
 from grasp_ros.sensitivity.directions import directions
-from grasp_ros.simulation.differentiate import carry, complete
+from grasp_ros.sensitivity.run import Carrier
+from grasp_ros.simulation.differentiate import complete
 from grasp_ros.simulation.sampled_plant import SampledPlant
 from grasp_ros.simulation.ticks import tick_of
 
@@ -39,10 +40,9 @@ FLOOR = 1e-9  # of the spread of a channel, or of others of its kind where it st
 
 
 class FitProblem(NamedTuple):
-    """What is searched: numbers of a scene that let its motion be the measured one."""
+    """What is searched: numbers of the scene of the data that let its motion be the measured one."""
 
     data: Measured
-    scene: Scene
     numbers: tuple[Number, ...]
     noise: Array  # (6,) standard deviation of each channel
 
@@ -64,7 +64,7 @@ class FitProblem(NamedTuple):
     def scene_at(self, y: Array) -> Scene:
         """The scene with the free numbers; outside its domain it is refused."""
         free = zip(self.numbers, self.values(y).items(), strict=True)
-        return self.scene.changed({key: value for number, (key, value) in free if number.channel is None})
+        return self.data.scene.changed({key: value for number, (key, value) in free if number.channel is None})
 
     def predict(self, y: Array, rows: int) -> tuple[Array, Array, Array]:
         """What is measured of the motion (rows, 6), its derivatives by y (rows, 6, n), and its touches.
@@ -109,8 +109,8 @@ def search(problem: FitProblem) -> Array:
             break
     if not math.isfinite(least):
         start = ", ".join(f"{key} {value:g}" for key, value in problem.values(begin).items())
-        raise Refused(f"{problem.data.name}: {start}: with these starts no run of {problem.scene.name} reaches its end;"
-                      " allowed: others")
+        raise Refused(f"{problem.data.name}: {start}: with these starts no run of {problem.data.scene.name} reaches its"
+                      " end; allowed: others")
     return best
 
 
@@ -189,7 +189,7 @@ def motion(data: Measured, scene: Scene, keys: Sequence[str], rows: int) -> tupl
     times, recorded = data.t[:rows], data.inputs is not None
     scene = _plant(scene) if recorded else _until(scene, times)
     integrator = Integrator(scene.system, continuous=not data.sampled, max_work=WORK + WORK_OF_TICK * scene.ticks)
-    carrier = carry(scene, integrator, directions(scene, keys, data.sampled), times, data.sampled)
+    carrier = Carrier(scene, integrator, directions(scene, keys, data.sampled), times, data.sampled)
     if data.inputs is None:
         states = complete(scene, integrator, data.sampled, times)
     else:

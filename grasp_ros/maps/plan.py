@@ -91,9 +91,6 @@ class Plan:
                "seed": whole("seed", self.seed, 0)}
         for name, value in own.items():
             object.__setattr__(self, name, value)
-        self._check_axes()
-
-    def _check_axes(self) -> None:
         names = [key for axis in self.axes for key in axis.keys]
         if not names or len(set(names)) < len(names):
             raise Refused(f"axes: {', '.join(names) or 'none'}; allowed: one or more numbers of the scene, each once")

@@ -43,9 +43,6 @@ class Store:
                 if not path.exists():  # otherwise another process has made it meanwhile
                     raise
         self._group = open_group(path, "r+")
-        self._check(wanted)
-
-    def _check(self, wanted: dict[str, Any]) -> None:
         for what, own in (("plan", wanted), ("versions", versions())):
             found = self._group.attrs[what]
             other = ", ".join(key for key in own if found.get(key) != own[key])

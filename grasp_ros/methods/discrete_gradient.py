@@ -26,7 +26,7 @@ from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.exact.impact import energy_quotient
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.contract import Problem, Solution
-from grasp_ros.methods.equations import SLIVER, Work, parameters, put
+from grasp_ros.methods.equations import SLIVER, Work, parameters
 from grasp_ros.physics.layout import EPS
 
 DONE, NOT_FINITE, NOT_SOLVED = 0, 1, 2
@@ -122,7 +122,7 @@ def run(q: Any, y: Any, duration: float, grid: Any, step: float, out: Any, work:
     """All steps; returns the outcome and how many rows of `out` are filled."""
     row, number, t = 0, 0, 0.0
     while row < grid.shape[0] and grid[row] <= 0.0:
-        put(out, row, y)
+        out[row] = y
         row += 1
     while t < duration:
         number += 1
@@ -137,7 +137,7 @@ def run(q: Any, y: Any, duration: float, grid: Any, step: float, out: Any, work:
         if not math.isfinite(total):
             return NOT_SOLVED if math.isnan(total) else NOT_FINITE, row
         while row < grid.shape[0] and grid[row] <= end:
-            put(out, row, within(y, z, h, (grid[row] - t) / (end - t)))
+            out[row] = within(y, z, h, (grid[row] - t) / (end - t))
             row += 1
         y, t = z, end
     return DONE, row

@@ -79,9 +79,3 @@ def kind_of(before: int, after: int) -> int:
     if before == OPEN:
         return TOUCH
     return CLAMP if after == CLAMPED else REENTRY
-
-
-@kernel
-def put(out: Any, row: int, y: Any) -> None:
-    """Write one state to a row of the output."""
-    out[row, 0], out[row, 1], out[row, 2], out[row, 3], out[row, 4], out[row, 5] = y

@@ -38,7 +38,6 @@ from grasp_ros.methods.equations import (
     condition,
     kind_of,
     parameters,
-    put,
     rates,
     relative,
 )
@@ -185,7 +184,7 @@ def deliver(linear: bool, y: Any, f: Any, z: Any, g: Any, t: float, reached: flo
     """Write the outputs in (t, reached] of a step from y (slope f) to z (slope g); returns the next row."""
     while row < grid.shape[0] and grid[row] <= reached:
         part = (grid[row] - t) / (reached - t)
-        put(out, row, along(y, part, along(z, -1.0, y)) if linear else hermite(y, f, z, g, reached - t, part))
+        out[row] = along(y, part, along(z, -1.0, y)) if linear else hermite(y, f, z, g, reached - t, part)
         row += 1
     return row
 
@@ -217,7 +216,7 @@ def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out:
     for side in (LEFT, RIGHT):
         mode[side] = CONTACT if rule == PLAIN else condition(q, y, side)
     while row < grid.shape[0] and grid[row] <= 0.0:
-        put(out, row, y)
+        out[row] = y
         row += 1
     while t < duration:
         number += 1

@@ -70,8 +70,9 @@ def _takes_own_arrays(result: Any) -> bool:
     return all(kind.layout == "C" and kind.mutable for kind in arrays)
 
 
+@cache
 class Door(types.WrapperAddressProtocol):
-    """`advance`, for a call by its address."""
+    """`advance`, compiled where it has not been, for a call by its address."""
 
     def __init__(self) -> None:
         compile_kernels()
@@ -85,12 +86,6 @@ class Door(types.WrapperAddressProtocol):
     def signature(self) -> Any:
         """Its types."""
         return self._result.signature
-
-
-@cache
-def door() -> Door:
-    """`advance`, compiled where it has not been."""
-    return Door()
 
 
 @kernel
@@ -207,5 +202,5 @@ def integrate_rows(rows: Rows, duration: float, wanted: Wanted, limits: Limits) 
         room = Room(block, order, *run, Output(
             np.zeros(0), np.zeros((0, 6)), events, np.zeros(len(Filled), dtype=np.int64),
             np.zeros(len(Work), dtype=np.int64), observer))
-        done = run_rows(door(), driven, rows, room, run_observer.memory, limits)
+        done = run_rows(Door(), driven, rows, room, run_observer.memory, limits)
     return int(done)

@@ -82,15 +82,6 @@ def clamped_loss(segment: SegmentRecord, side: Body) -> float:
     return stored_energy(hertzian, before) - stored_energy(hertzian, after)
 
 
-@kernel
-def flight_losses(segment: SegmentRecord, seen: Array) -> None:
-    """Add what a flight takes."""
-    for body in (LEFT, OBJECT, RIGHT):
-        if segment.m.own[body, Of.DAMPING] != 0.0 or segment.m.bodies[body, Of.DAMPING] != 0.0:
-            add_damping(segment, seen, body, flight_squares(segment, body))
-    seen[Seen.IMPACTS] += clamped_loss(segment, LEFT) + clamped_loss(segment, RIGHT)
-
-
 @inlined
 def pace(segment: SegmentRecord, s: float) -> float:
     """dt/ds of the variable of the polynomials, s."""
@@ -132,7 +123,10 @@ def step_losses(segment: SegmentRecord, seen: Array) -> None:
 def add_losses(segment: SegmentRecord, base: Array, seen: Array) -> None:
     """Add what a segment takes, and the work of the forces that are not in `base`: held commands, external forces."""
     if segment.kind == Kind.FLIGHT:
-        flight_losses(segment, seen)
+        for body in (LEFT, OBJECT, RIGHT):
+            if segment.m.own[body, Of.DAMPING] != 0.0 or segment.m.bodies[body, Of.DAMPING] != 0.0:
+                add_damping(segment, seen, body, flight_squares(segment, body))
+        seen[Seen.IMPACTS] += clamped_loss(segment, LEFT) + clamped_loss(segment, RIGHT)
     else:
         step_losses(segment, seen)
     for body in (LEFT, OBJECT, RIGHT):

@@ -96,15 +96,6 @@ def watch_rest(segment: SegmentRecord, seen: Array, wanted: int) -> None:
 
 
 @kernel
-def watch_level(m: Memory) -> None:
-    """Keep the largest rise of V_c, as it is at the ends of segments."""
-    seen = m.seen
-    seen[Seen.LEVEL] = level(m.loop, m.pairs, m.y)
-    seen[Seen.RISE] = max(seen[Seen.RISE], seen[Seen.LEVEL] - seen[Seen.LEAST])
-    seen[Seen.LEAST] = min(seen[Seen.LEAST], seen[Seen.LEVEL])
-
-
-@kernel
 def begin(m: Memory, bound: float) -> None:
     """Forget the last run, and remember the state at which this one begins."""
     seen, y = m.seen, m.y
@@ -124,17 +115,6 @@ def begin(m: Memory, bound: float) -> None:
             seen[Seen.OUTSIDE + body] = math.inf
 
 
-@kernel
-def finish(m: Memory) -> None:
-    """At the end of a run: keep the last times outside the bound, and find when all bodies settled."""
-    seen = m.seen
-    if m.switches[Switch.WANTED] & Wanted.BOUND.value:
-        for body in (LEFT, OBJECT, RIGHT):
-            seen[Seen.LAST_OUTSIDE + body] = seen[Seen.OUTSIDE + body]
-    if m.switches[Switch.CERTAIN] != 0:
-        seen[Seen.SETTLED] = settled_from(m, level(m.loop, m.pairs, m.y))
-
-
 @door
 def observe(address: int, kind: int, t: float, s: float, unit: float, degree: int) -> int:
     """Remember what is wanted of a segment of t s, which has just ended; called by `callback.notify`.
@@ -143,13 +123,17 @@ def observe(address: int, kind: int, t: float, s: float, unit: float, degree: in
     FINISH, and with REST where nothing moves.
     """
     m = memory_at(address)
+    segment, seen, wanted = SegmentRecord(kind, t, s, degree, m), m.seen, m.switches[Switch.WANTED]
     if kind == BEGIN:
         begin(m, t)
         return 0
     if kind == FINISH:
-        finish(m)
+        if wanted & Wanted.BOUND.value:
+            for body in (LEFT, OBJECT, RIGHT):
+                seen[Seen.LAST_OUTSIDE + body] = seen[Seen.OUTSIDE + body]
+        if m.switches[Switch.CERTAIN] != 0:
+            seen[Seen.SETTLED] = settled_from(m, level(m.loop, m.pairs, m.y))
         return 0
-    segment, seen, wanted = SegmentRecord(kind, t, s, degree, m), m.seen, m.switches[Switch.WANTED]
     if kind == REST:
         watch_rest(segment, seen, wanted)
         return 0
@@ -164,7 +148,9 @@ def observe(address: int, kind: int, t: float, s: float, unit: float, degree: in
     if m.switches[Switch.LOSSES] != 0:
         call(m.switches[Switch.LOSSES], address, kind, t, s, unit, degree)
     if wanted & Wanted.RISE.value:
-        watch_level(m)
+        seen[Seen.LEVEL] = level(m.loop, m.pairs, m.y)
+        seen[Seen.RISE] = max(seen[Seen.RISE], seen[Seen.LEVEL] - seen[Seen.LEAST])
+        seen[Seen.LEAST] = min(seen[Seen.LEAST], seen[Seen.LEVEL])
     for place in range(STATES):
         m.before[place] = m.y[place]
     return 0

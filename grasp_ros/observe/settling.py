@@ -20,12 +20,6 @@ BISECTIONS = 60
 reach = kernel(lyapunov.reach)
 
 
-@inlined
-def last_of(seen: Array) -> float:
-    """When a body was outside last, s."""
-    return max(seen[Seen.OUTSIDE + LEFT], seen[Seen.OUTSIDE + OBJECT], seen[Seen.OUTSIDE + RIGHT])
-
-
 @kernel
 def settled_from(m: Memory, V_c: float) -> float:
     """The time in s from which on no body leaves the bound for good; inf: it never comes; see `Seen.SETTLED`.
@@ -37,7 +31,7 @@ def settled_from(m: Memory, V_c: float) -> float:
     if not (most < math.inf and bound > 0.0):
         return math.nan
     if most <= bound or m.rest[SINCE] < math.inf:
-        return last_of(m.seen)
+        return max(m.seen[Seen.OUTSIDE + LEFT], m.seen[Seen.OUTSIDE + OBJECT], m.seen[Seen.OUTSIDE + RIGHT])
     return UNDECIDED if takes_energy(m) else math.inf
 
 

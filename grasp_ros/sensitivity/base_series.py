@@ -8,13 +8,13 @@ from grasp_ros.exact.compilation.vectors import HALF, add_product, load_half, sp
 from grasp_ros.exact.records import Array
 from grasp_ros.physics.impact_law import EXPONENT
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Pair, V, X, Z
-from grasp_ros.sensitivity.tangents import AHEAD, WEIGHTS, Row, TangentMotion, TangentTable, Weight
+from grasp_ros.sensitivity.tangents import AHEAD, WEIGHTS, Row, Tangents, Weight
 
 
 @kernel
-def touches(motion: TangentMotion, body: Body) -> bool:
+def touches(t: Tangents, body: Body) -> bool:
     """Whether a body takes part in the contacts of a step; the others fly."""
-    return body == OBJECT or motion.mode[body] == Pair.CONTACT
+    return body == OBJECT or t.mode[body] == Pair.CONTACT
 
 
 @kernel
@@ -44,15 +44,15 @@ def put(table: Array, k: int, left: float, right: float, next_left: float, next_
 
 
 @kernel
-def pair_series(motion: TangentMotion, table: TangentTable, n: int) -> None:
+def pair_series(t: Tangents, n: int) -> None:
     """Write the series that both pairs bring, by side; without contact they are 0.
 
     With s = w dt/ds, a polynomial in w, and h = u s: s (1 + p u') gives dF/du, h gives dF/du', h u' the damping.
     """
-    c, a, b, (first, second, third) = motion.c, table.factors[0], table.factors[1], table.products
-    pace, pairs = table.rows[Row.PACE], motion.pairs
+    c, a, b, (first, second, third) = t.c, t.factors[0], t.factors[1], t.products
+    pace, pairs = t.rows[Row.PACE], t.pairs
     loss_l, loss_r = pairs[LEFT, Law.DISSIPATION], pairs[RIGHT, Law.DISSIPATION]
-    left, right = touches(motion, LEFT), touches(motion, RIGHT)
+    left, right = touches(t, LEFT), touches(t, RIGHT)
     for k in range(n + 1):
         i = LANES * k
         w_l, w_r = c[i + Z.L] if left else 0.0, c[i + Z.R] if right else 0.0
@@ -74,14 +74,14 @@ def pair_series(motion: TangentMotion, table: TangentTable, n: int) -> None:
 
 
 @kernel
-def base_series(motion: TangentMotion, table: TangentTable, n: int) -> None:
+def base_series(t: Tangents, n: int) -> None:
     """Write all series of the run that the tangents' equations need."""
-    pair_series(motion, table, n)
-    (first, second, third), rows, weights, c = table.products, table.rows, table.weights, motion.c
+    pair_series(t, n)
+    (first, second, third), rows, weights, c = t.products, t.rows, t.weights, t.c
     for side in (LEFT, RIGHT):
-        if not touches(motion, side):
+        if not touches(t, side):
             continue
-        hertzian, loss = motion.pairs[side, Law.HERTZIAN], motion.pairs[side, Law.DISSIPATION]
+        hertzian, loss = t.pairs[side, Law.HERTZIAN], t.pairs[side, Law.DISSIPATION]
         sign, v = 1.0 if side == LEFT else -1.0, velocity_lane(side)
         for k in range(n):
             i, j = LANES * (k + 1), HALF * k + side

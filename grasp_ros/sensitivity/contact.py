@@ -14,19 +14,7 @@ from grasp_ros.exact.numerics.polynomial import INVERSE
 from grasp_ros.exact.records import Array
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Law, Of, U, V, X
 from grasp_ros.sensitivity.base_series import base_series, touches
-from grasp_ros.sensitivity.tangents import (
-    BLOCK,
-    ODD,
-    STATES,
-    STEP,
-    SUMS,
-    WEIGHTS,
-    Row,
-    TangentMotion,
-    TangentRates,
-    TangentTable,
-    Weight,
-)
+from grasp_ros.sensitivity.tangents import BLOCK, ODD, STATES, STEP, SUMS, WEIGHTS, Row, Tangents, Weight
 
 MOST_HALVINGS = 200
 NEGLECTED = 4096.0 * EPS  # 1e-12 for a step; one digit more costs 5 %, as more steps are made in parts
@@ -40,14 +28,14 @@ def apart(side: Body, arm: Array, middle: Array) -> Array:
 
 
 @inlined
-def sum_products(table: TangentTable, block: int, k: int, side: Body, alone: bool) -> None:
+def sum_products(t: Tangents, block: int, k: int, side: Body, alone: bool) -> None:
     """Sum the products of series for coefficients k and k + 1 that a pair in contact brings, of four directions.
 
     They are x and v of the arm and v of the object times dt/ds, and what the changes of u and u' make of the impact.
     Two orders share what they take from memory, which is what takes the time; a product with the newest coefficient is
     left to `add_newest`.
     """
-    f, weights, i, arm = table.series, table.weights, BLOCK * block, HALF * velocity_lane(side)
+    f, weights, i, arm = t.series, t.weights, BLOCK * block, HALF * velocity_lane(side)
     to_slope, to_drag = WEIGHTS * (Weight.SLOPE + side), WEIGHTS * (Weight.DRAG + side)
     x_0 = v_0 = o_0 = slope_0 = drag_0 = x_1 = v_1 = o_1 = slope_1 = drag_1 = spread_half(0.0)
     for m in range(HALF * k, -1, -HALF):
@@ -63,8 +51,8 @@ def sum_products(table: TangentTable, block: int, k: int, side: Body, alone: boo
         drag_0 = add_product(drag_0, rate, load_half(weights, to_drag + m))
         drag_1 = add_product(drag_1, rate, load_half(weights, to_drag + m + HALF))
         i += STEP
-    store_sums(table.sums, SUMS * block, side, alone, (x_0, v_0, o_0, slope_0 + drag_0))
-    store_sums(table.sums, SUMS * block + ODD, side, alone, (x_1, v_1, o_1, slope_1 + drag_1))
+    store_sums(t.sums, SUMS * block, side, alone, (x_0, v_0, o_0, slope_0 + drag_0))
+    store_sums(t.sums, SUMS * block + ODD, side, alone, (x_1, v_1, o_1, slope_1 + drag_1))
 
 
 @inlined
@@ -79,10 +67,10 @@ def store_sums(sums: Array, first: int, side: Body, alone: bool, found: tuple[Ar
 
 
 @inlined
-def add_newest(table: TangentTable, block: int, k: int, side: Body, alone: bool) -> None:
+def add_newest(t: Tangents, block: int, k: int, side: Body, alone: bool) -> None:
     """Add the products with the coefficients k of a pair, which have just been found, to the sums of odd order k."""
-    f, weights, i, arm = table.series, table.weights, BLOCK * block + STEP * k, HALF * velocity_lane(side)
-    sums, first, pace = table.sums, SUMS * block + ODD, load_half(weights, 0)
+    f, weights, i, arm = t.series, t.weights, BLOCK * block + STEP * k, HALF * velocity_lane(side)
+    sums, first, pace = t.sums, SUMS * block + ODD, load_half(weights, 0)
     x, v, middle = load_half(f, i + arm - HALF), load_half(f, i + arm), load_half(f, i + HALF * V.O)
     slope = load_half(weights, WEIGHTS * (Weight.SLOPE + side))
     drag = load_half(weights, WEIGHTS * (Weight.DRAG + side))
@@ -95,86 +83,70 @@ def add_newest(table: TangentTable, block: int, k: int, side: Body, alone: bool)
 
 
 @inlined
-def impact(rates: TangentRates, table: TangentTable, block: int, k: int, side: Body) -> Array:
+def impact(t: Tangents, block: int, k: int, side: Body) -> Array:
     """Coefficient k of the change of the impact force of a pair, times dt/ds."""
-    law, first, rows = rates.law[side], HALF * block, table.rows
-    total = load_half(table.sums, SUMS * block + ODD * (k % 2) + HALF * (U.L + side))
+    law, first, rows = t.law[side], HALF * block, t.rows
+    total = load_half(t.sums, SUMS * block + ODD * (k % 2) + HALF * (U.L + side))
     total = add_product(total, load_half(law[Law.HERTZIAN], first), rows[Row.HERTZIAN + side, k])
     return add_product(total, load_half(law[Law.DISSIPATION], first), rows[Row.LOSS + side, k])
 
 
 @inlined
-def advance_body(
-    motion: TangentMotion, acting: Array, table: TangentTable, at: tuple[int, int], body: Body, push: Array
-) -> None:
+def advance_body(t: Tangents, block: int, k: int, body: Body, push: Array) -> None:
     """Write coefficient k + 1 of a body under coefficient k of the change of the impacts on it."""
-    (block, k), rows, row, rates, v = at, table.rows, motion.bodies[body], acting[body], velocity_lane(body)
+    rows, row, own, v = t.rows, t.bodies[body], t.acting[body], velocity_lane(body)
     share, inverse, first = INVERSE[k + 1], 1.0 / row[Of.MASS], HALF * block
     place = SUMS * block + ODD * (k % 2) + HALF * v
-    x, moved = load_half(table.sums, place - HALF), load_half(table.sums, place)
-    driven = rows[Row.PACE, k] * load_half(rates[Of.FORCE], first)
-    driven = driven - rows[Row.GAIN + body, k] * load_half(rates[Of.MASS], first)
-    slowed = rows[Row.WAY + body, k] * load_half(rates[Of.STIFFNESS], first)
-    slowed = slowed + rows[Row.SPEED + body, k] * load_half(rates[Of.DAMPING], first)
+    x, moved = load_half(t.sums, place - HALF), load_half(t.sums, place)
+    driven = rows[Row.PACE, k] * load_half(own[Of.FORCE], first)
+    driven = driven - rows[Row.GAIN + body, k] * load_half(own[Of.MASS], first)
+    slowed = rows[Row.WAY + body, k] * load_half(own[Of.STIFFNESS], first)
+    slowed = slowed + rows[Row.SPEED + body, k] * load_half(own[Of.DAMPING], first)
     held = row[Of.STIFFNESS] * inverse * x + row[Of.DAMPING] * inverse * moved
     place = BLOCK * block + STEP * (k + 1) + HALF * (v - 1)
-    store(table.series, place, share * moved)
-    store(table.series, place + HALF, share * (inverse * (push + driven - slowed) - held))
+    store(t.series, place, share * moved)
+    store(t.series, place + HALF, share * (inverse * (push + driven - slowed) - held))
 
 
 @kernel
-def expand_tangents(motion: TangentMotion, rates: TangentRates, table: TangentTable, n: int) -> None:
+def expand_tangents(t: Tangents, n: int) -> None:
     """Write the series of the tangents over a Taylor step of even degree n."""
-    base_series(motion, table, n)
-    left, right, nothing = touches(motion, LEFT), touches(motion, RIGHT), spread_half(0.0)
-    blocks = rates.x.shape[1] // HALF
+    base_series(t, n)
+    left, right, nothing = touches(t, LEFT), touches(t, RIGHT), spread_half(0.0)
+    blocks = t.x.shape[1] // HALF
     for block in range(blocks):
         for lane in range(STATES):
-            store(table.series, BLOCK * block + HALF * lane, load_half(rates.x[lane], HALF * block))
+            store(t.series, BLOCK * block + HALF * lane, load_half(t.x[lane], HALF * block))
     for k in range(n):
         for block in range(blocks):  # within: while one waits for its newest coefficient, the next one sums
             on_l = on_r = nothing
             for side in (LEFT, RIGHT):
-                if touches(motion, side) and k % 2 == 0:
-                    sum_products(table, block, k, side, side == LEFT or not left)
-                elif touches(motion, side):
-                    add_newest(table, block, k, side, side == LEFT or not left)
+                if touches(t, side) and k % 2 == 0:
+                    sum_products(t, block, k, side, side == LEFT or not left)
+                elif touches(t, side):
+                    add_newest(t, block, k, side, side == LEFT or not left)
             if left:
-                on_l = impact(rates, table, block, k, LEFT)
-                advance_body(motion, rates.acting, table, (block, k), LEFT, nothing - on_l)
+                on_l = impact(t, block, k, LEFT)
+                advance_body(t, block, k, LEFT, nothing - on_l)
             if right:
-                on_r = impact(rates, table, block, k, RIGHT)
-                advance_body(motion, rates.acting, table, (block, k), RIGHT, on_r)
-            advance_body(motion, rates.acting, table, (block, k), OBJECT, on_l - on_r)
+                on_r = impact(t, block, k, RIGHT)
+                advance_body(t, block, k, RIGHT, on_r)
+            advance_body(t, block, k, OBJECT, on_l - on_r)
 
 
 @kernel
-def step_tangents(motion: TangentMotion, rates: TangentRates, table: TangentTable, n: int, s: float) -> None:
-    """Write the tangents of the bodies in contact at s of a step, whose series are there, to `at`.
-
-    All six are summed, so that none waits for another; those of a body that flies are old, and are not written.
-    """
-    for block in range(rates.x.shape[1] // HALF):
-        x_l = v_l = x_o = v_o = x_r = v_r = spread_half(0.0)
-        for i in range(BLOCK * block + STEP * n, BLOCK * block - STEP, -STEP):
-            x_l = add_product(load_half(table.series, i + HALF * X.L), x_l, s)
-            v_l = add_product(load_half(table.series, i + HALF * V.L), v_l, s)
-            x_o = add_product(load_half(table.series, i + HALF * X.O), x_o, s)
-            v_o = add_product(load_half(table.series, i + HALF * V.O), v_o, s)
-            x_r = add_product(load_half(table.series, i + HALF * X.R), x_r, s)
-            v_r = add_product(load_half(table.series, i + HALF * V.R), v_r, s)
-        store_body(rates.at, block, OBJECT, x_o, v_o)
-        if touches(motion, LEFT):
-            store_body(rates.at, block, LEFT, x_l, v_l)
-        if touches(motion, RIGHT):
-            store_body(rates.at, block, RIGHT, x_r, v_r)
-
-
-@inlined
-def store_body(at: Array, block: int, body: Body, x: Array, v: Array) -> None:
-    """Write the tangents of a body, of four directions."""
-    store(at[velocity_lane(body) - 1], HALF * block, x)
-    store(at[velocity_lane(body)], HALF * block, v)
+def step_tangents(t: Tangents, n: int, s: float) -> None:
+    """Write the tangents of the bodies in contact at s of a step, whose series are there, to `at`."""
+    for block in range(t.x.shape[1] // HALF):
+        for body in (LEFT, OBJECT, RIGHT):
+            lane, x, v = velocity_lane(body), spread_half(0.0), spread_half(0.0)
+            if not touches(t, body):
+                continue
+            for i in range(BLOCK * block + STEP * n + HALF * lane, BLOCK * block + HALF * lane - 1, -STEP):
+                x = add_product(load_half(t.series, i - HALF), x, s)
+                v = add_product(load_half(t.series, i), v, s)
+            store(t.at[lane - 1], HALF * block, x)
+            store(t.at[lane], HALF * block, v)
 
 
 @kernel
@@ -190,16 +162,16 @@ def ends_within(series: Array, first: int, n: int, s: float) -> bool:
 
 
 @kernel
-def exact_length(motion: TangentMotion, table: TangentTable, n: int, s: float) -> float:
+def exact_length(t: Tangents, n: int, s: float) -> float:
     """The largest s 2^-k at which the last terms of all tangents are below NEGLECTED of their first ones.
 
     The step of the run is as long as its own motion allows, which may have died down where its tangents have not.
     """
-    for block in range(table.series.shape[0] // BLOCK):
+    for block in range(t.series.shape[0] // BLOCK):
         for body in (LEFT, OBJECT, RIGHT):
             first, halvings = BLOCK * block + HALF * (velocity_lane(body) - 1), 0
-            while touches(motion, body) and halvings < MOST_HALVINGS and not (
-                ends_within(table.series, first, n, s) and ends_within(table.series, first + HALF, n, s)
+            while touches(t, body) and halvings < MOST_HALVINGS and not (
+                ends_within(t.series, first, n, s) and ends_within(t.series, first + HALF, n, s)
             ):
                 s, halvings = 0.5 * s, halvings + 1
     return s

@@ -134,12 +134,15 @@ def _is_off(scene: Scene, key: str) -> bool:
 
 
 def _difference(scene: Scene, key: str, parameter: Parameter, ticks: int) -> Iterator[Array]:
-    """Derivatives of all arrays of a system by one number."""
+    """Derivatives of all arrays of a system by one number, in the order of `Directions`."""
     section, _, name = key.partition(".")
     value = scene.values[section][name]
 
     def at(other: float) -> tuple[Array, ...]:  # which need not be in its range
-        return _numbers(build({**scene.values, section: {**scene.values[section], name: other}}), ticks)
+        system = build({**scene.values, section: {**scene.values[section], name: other}})
+        external = system.external_over(np.arange(ticks)) if ticks else np.zeros((0, 3))
+        return (system.bodies, system.pairs, system.state, np.array([system.coulomb]),
+                np.minimum(system.law_rows, LARGEST), external)
 
     if parameter.unit == "rad":
         low, high, width = at(value - 0.5 * math.pi), at(value + 0.5 * math.pi), 2.0
@@ -147,13 +150,6 @@ def _difference(scene: Scene, key: str, parameter: Parameter, ticks: int) -> Ite
         width = float(value) or 1.0
         low, high = at(value), at(value + width)
     return ((b - a) / width for a, b in zip(low, high, strict=True))
-
-
-def _numbers(system: System, ticks: int) -> tuple[Array, ...]:
-    """The arrays of a system, in the order of `Directions`."""
-    external = system.external_over(np.arange(ticks)) if ticks else np.zeros((0, 3))
-    return (system.bodies, system.pairs, system.state, np.array([system.coulomb]),
-            np.minimum(system.law_rows, LARGEST), external)
 
 
 def closing(side: int, state: Array) -> tuple[Array, Array]:

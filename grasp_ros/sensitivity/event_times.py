@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,7 +42,8 @@ def event_rates(scene: Scene, changes: Directions, sampled: bool, events: Array,
     body, kind, moved = events[:, Entry.BODY], events[:, Entry.KIND], moments.rates
     gained, made = accelerations(bodies, pairs, moments), events[:, Entry.TIME] <= 0.0
     if sampled or scene.system.external:
-        made |= (kind == Transition.SLIP) & _are_ticks(scene, events[:, Entry.TIME])
+        ticks = events[:, Entry.TIME] * NANOSECONDS / scene.period_ns  # where inputs may change
+        made |= (kind == Transition.SLIP) & (abs(ticks - np.round(ticks)) <= 8.0 * EPS * ticks)
     change, rate = np.zeros((len(events), moved.shape[2])), np.ones(len(events))
     stops = kind == Transition.STICK
     change[stops], rate[stops] = moved[stops, COLUMN[OBJECT] + 1], gained[OBJECT, stops]
@@ -91,9 +92,3 @@ def _excess(pairs: Array, changes: Directions, moments: Moments, gained: Array) 
                           + np.outer(factor * elastic, d_hertzian) + np.outer(hertzian * speed * elastic, d_loss))
         rate += sign * slope * speed + drag * gained[side]  # the object stands still
     return change - np.sign(rate)[:, None] * changes.coulomb, rate
-
-
-def _are_ticks(scene: Scene, times: Array) -> Any:
-    """Where inputs may change at times (e,)."""
-    ticks = times * NANOSECONDS / scene.period_ns
-    return abs(ticks - np.round(ticks)) <= 8.0 * EPS * ticks

@@ -19,7 +19,7 @@ from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, surface_factor
 from grasp_ros.exact.numerics.polynomial import invert_time
 from grasp_ros.exact.numerics.roots import value_and_rate
-from grasp_ros.exact.records import Array, Order, Step
+from grasp_ros.exact.records import Order, Step
 from grasp_ros.exact.tolerances import SURFACE
 from grasp_ros.physics.impact_law import EXPONENT
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, Slide, U, V, X
@@ -27,51 +27,25 @@ from grasp_ros.sensitivity.base_series import touches
 from grasp_ros.sensitivity.contact import exact_length, expand_tangents, shift, step_tangents
 from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent, write_flows
 from grasp_ros.sensitivity.held import act, enter_tick
-from grasp_ros.sensitivity.tangents import (
-    UNSEEN,
-    Count,
-    Number,
-    TangentMotion,
-    TangentOutputs,
-    TangentRates,
-    Tangents,
-    copy_matrix,
-    tangents_at,
-)
+from grasp_ros.sensitivity.tangents import UNSEEN, Count, Number, Tangents, copy_matrix, tangents_at
 
 
 @kernel
-def impact_now(motion: TangentMotion, side: Body) -> float:
+def impact_now(t: Tangents, side: Body) -> float:
     """Impact force of a pair at the begin of a segment, N."""
-    if motion.mode[side] != Pair.CONTACT:
+    if t.mode[side] != Pair.CONTACT:
         return 0.0
-    u, d = max(motion.before[U.L + side], 0.0), approach(motion.before, side)
-    return elastic_force(motion.pairs[side, Law.HERTZIAN], u) * damping_factor(motion.pairs[side, Law.DISSIPATION], d)
+    u, d = max(t.before[U.L + side], 0.0), approach(t.before, side)
+    return elastic_force(t.pairs[side, Law.HERTZIAN], u) * damping_factor(t.pairs[side, Law.DISSIPATION], d)
 
 
 @kernel
-def scale_object(moved: Array, factor: float) -> None:
-    """Multiply the tangents of the object's velocity."""
-    for j in range(moved.shape[1]):
-        moved[V.O, j] *= factor
-
-
-@kernel
-def turning_ratio(motion: TangentMotion, old: float) -> float:
-    """Acceleration of an object after it turns, by that before, under its constant force before; nan: it had none."""
-    push, new = impact_now(motion, LEFT) - impact_now(motion, RIGHT), motion.bodies[OBJECT]
-    push -= new[Of.STIFFNESS] * motion.before[X.O] + new[Of.DAMPING] * motion.before[V.O]
-    first = push + old
-    return (push + new[Of.FORCE]) / first if first != 0.0 else math.nan
-
-
-@kernel
-def pass_friction(motion: TangentMotion, moved: Array, outputs: TangentOutputs, at_tick: bool) -> None:
+def pass_friction(t: Tangents, at_tick: bool) -> None:
     """The jump of the tangents where the mode of an object under dry friction has changed.
 
     Of one that stops just when inputs change nobody knows which of them would act on it.
     """
-    before, now = outputs.counts[Count.SLIDE], motion.mode[OBJECT]
+    before, now = t.counts[Count.SLIDE], t.mode[OBJECT]
     if now == Slide.FREE or now == before:
         return
     factor, slid = 1.0, before == Slide.RIGHTWARD or before == Slide.LEFTWARD
@@ -80,181 +54,161 @@ def pass_friction(motion: TangentMotion, moved: Array, outputs: TangentOutputs, 
     elif now == Slide.STUCK:
         factor = 0.0
     elif slid:
-        factor = turning_ratio(motion, outputs.numbers[Number.FORCE])
-    elif before == UNSEEN and motion.before[V.O] == 0.0:
-        for j in range(moved.shape[1]):
-            if moved[V.O, j] != 0.0:
+        push, new = impact_now(t, LEFT) - impact_now(t, RIGHT), t.bodies[OBJECT]
+        push -= new[Of.STIFFNESS] * t.before[X.O] + new[Of.DAMPING] * t.before[V.O]
+        first = push + t.numbers[Number.FORCE]  # under the constant force before
+        factor = (push + new[Of.FORCE]) / first if first != 0.0 else math.nan
+    elif before == UNSEEN and t.before[V.O] == 0.0:
+        for j in range(t.x.shape[1]):
+            if t.x[V.O, j] != 0.0:
                 factor = math.nan
     if math.isnan(factor):  # the one-sided derivatives differ
-        outputs.numbers[Number.CORNER] = min(outputs.numbers[Number.CORNER], outputs.numbers[Number.TIME])
+        t.numbers[Number.CORNER] = min(t.numbers[Number.CORNER], t.numbers[Number.TIME])
     else:
-        scale_object(moved, factor)
+        for j in range(t.x.shape[1]):
+            t.x[V.O, j] *= factor
 
 
 @kernel
-def check_glide(motion: TangentMotion, rates: TangentRates, outputs: TangentOutputs) -> None:
+def check_glide(t: Tangents) -> None:
     """Note a run that begins with a pair at u' = -1/p which nothing moves off: a change to one side has a force."""
-    row, y = motion.bodies[OBJECT], motion.before
-    pushed = (impact_now(motion, LEFT) - impact_now(motion, RIGHT)) / row[Of.MASS]
+    row, y = t.bodies[OBJECT], t.before
+    pushed = (impact_now(t, LEFT) - impact_now(t, RIGHT)) / row[Of.MASS]
     for side in (LEFT, RIGHT):
-        loss, d, arm = motion.pairs[side, Law.DISSIPATION], approach(y, side), velocity_lane(side)
+        loss, d, arm = t.pairs[side, Law.DISSIPATION], approach(y, side), velocity_lane(side)
         x, v, sign = arm_of(y, side)
-        if y[U.L + side] <= 0.0 or surface_factor(motion.pairs, y, side, SURFACE) != 0.0:
+        if y[U.L + side] <= 0.0 or surface_factor(t.pairs, y, side, SURFACE) != 0.0:
             continue
-        if own_acceleration(motion.bodies[side], x, v) != own_acceleration(row, y[X.O], y[V.O]) + pushed:
+        if own_acceleration(t.bodies[side], x, v) != own_acceleration(row, y[X.O], y[V.O]) + pushed:
             continue
-        for j in range(rates.x.shape[1]):
-            faster = sign * (rates.x[arm, j] - rates.x[V.O, j])
-            if rates.law[side, Law.DISSIPATION, j] * d + loss * faster != 0.0:
-                outputs.numbers[Number.CORNER] = 0.0
+        for j in range(t.x.shape[1]):
+            faster = sign * (t.x[arm, j] - t.x[V.O, j])
+            if t.law[side, Law.DISSIPATION, j] * d + loss * faster != 0.0:
+                t.numbers[Number.CORNER] = 0.0
 
 
 @kernel
-def write_output(motion: TangentMotion, outputs: TangentOutputs, rates: TangentRates) -> None:
+def write_output(t: Tangents) -> None:
     """Write what stands in `at` to the next output, and what acts on the bodies where it is wanted."""
-    row = outputs.rows[outputs.counts[Count.FILLED]]
-    copy_matrix(outputs.out[row], rates.at)
-    outputs.counts[Count.FILLED] += 1
-    row -= outputs.out.shape[0] - outputs.forces.shape[0]
+    row = t.order[t.counts[Count.FILLED]]
+    copy_matrix(t.out[row], t.at)
+    t.counts[Count.FILLED] += 1
+    row -= t.out.shape[0] - t.forces.shape[0]
     if row < 0:
         return
     for body in (LEFT, RIGHT, OBJECT):
-        outputs.forces[row, body, 0] = motion.bodies[body, Of.MASS]
-        outputs.forces[row, body, 1] = motion.bodies[body, Of.FORCE]
-        for j in range(outputs.out.shape[2]):
-            outputs.forces[row, body, 2 + j] = rates.acting[body, Of.FORCE, j]
+        t.forces[row, body, 0] = t.bodies[body, Of.MASS]
+        t.forces[row, body, 1] = t.bodies[body, Of.FORCE]
+        for j in range(t.out.shape[2]):
+            t.forces[row, body, 2 + j] = t.acting[body, Of.FORCE, j]
 
 
 @kernel
-def next_output(outputs: TangentOutputs) -> float:
+def next_output(t: Tangents) -> float:
     """Time of the next output, s; inf: there is none."""
-    row = outputs.counts[Count.FILLED]
-    return outputs.grid[row] if row < outputs.grid.shape[0] else math.inf
+    row = t.counts[Count.FILLED]
+    return t.grid[row] if row < t.grid.shape[0] else math.inf
 
 
 @kernel
-def since(outputs: TangentOutputs, begin: float, span: float) -> float:
+def since(t: Tangents, begin: float, span: float) -> float:
     """Time from a begin to the next output, within a span."""
-    return min(max(next_output(outputs) - begin, 0.0), span)
-
-
-@kernel
-def pass_rest(t: Tangents, span: float) -> None:
-    """Move the tangents over a time at rest, and write the outputs on the way."""
-    begin = t.outputs.numbers[Number.TIME]
-    end = begin + span
-    act(t.motion.mode, t.rates, t.inputs)
-    while next_output(t.outputs) <= end:
-        rest_tangent(t.motion, t.rates, t.matrices, since(t.outputs, begin, span))
-        write_output(t.motion, t.outputs, t.rates)
-    rest_tangent(t.motion, t.rates, t.matrices, span)
-    copy_matrix(t.rates.x, t.rates.at)
-    t.outputs.numbers[Number.TIME] = end
+    return min(max(next_output(t) - begin, 0.0), span)
 
 
 @kernel
 def enter_ticks(t: Tangents, interval: float) -> None:
     """Take the ticks up to the begin of an interval, in s."""
-    counts, period = t.outputs.counts, t.outputs.numbers[Number.PERIOD]
+    counts, period = t.counts, t.numbers[Number.PERIOD]
     last = math.floor(interval / period + 0.5) if counts[Count.DRIVEN] else counts[Count.TICK]
     while counts[Count.TICK] < last:
         counts[Count.TICK] += 1
-        if enter_tick(t.inputs, t.motion.before, t.rates.x, counts[Count.TICK]):
-            t.outputs.numbers[Number.CORNER] = min(t.outputs.numbers[Number.CORNER], counts[Count.TICK] * period)
+        if enter_tick(t, counts[Count.TICK]):
+            t.numbers[Number.CORNER] = min(t.numbers[Number.CORNER], counts[Count.TICK] * period)
 
 
 @kernel
-def add_neglected(motion: TangentMotion, moved: Array, side: Body, span: float) -> None:
+def add_neglected(t: Tangents, side: Body, span: float) -> None:
     """Add the slope of the force of a pair that begins or leaves: its impulse is below rounding, its slope is not.
 
     It begins from u = 0, or leaves to it, by a power of the time.
     """
-    u, after, arm = motion.before[U.L + side], motion.y[U.L + side], velocity_lane(side)
+    u, after, arm = t.before[U.L + side], t.y[U.L + side], velocity_lane(side)
     deepest = max(u, after)
     if deepest <= 0.0:
         return
-    rate = approach(motion.y if after > u else motion.before, side)
-    factor = max(damping_factor(motion.pairs[side, Law.DISSIPATION], rate), 0.0)
-    slope = elastic_slope(motion.pairs[side, Law.HERTZIAN], deepest)
+    rate = approach(t.y if after > u else t.before, side)
+    factor = max(damping_factor(t.pairs[side, Law.DISSIPATION], rate), 0.0)
+    slope = elastic_slope(t.pairs[side, Law.HERTZIAN], deepest)
     mean = slope / (1.0 + (EXPONENT - 1.0) * abs(rate) * span / deepest)  # for u = a t^n
     impulse = span * factor * mean
-    arm_mass, mass = motion.bodies[side, Of.MASS], motion.bodies[OBJECT, Of.MASS]
-    for j in range(moved.shape[1]):
-        apart = moved[arm - 1, j] - moved[X.O, j]
-        moved[arm, j] -= impulse * apart / arm_mass
-        moved[V.O, j] += impulse * apart / mass
+    arm_mass, mass = t.bodies[side, Of.MASS], t.bodies[OBJECT, Of.MASS]
+    for j in range(t.x.shape[1]):
+        apart = t.x[arm - 1, j] - t.x[X.O, j]
+        t.x[arm, j] -= impulse * apart / arm_mass
+        t.x[V.O, j] += impulse * apart / mass
 
 
 @kernel
 def fly_free(t: Tangents, presses: bool, tau: float) -> None:
     """Write the tangents of the bodies that touch nothing after tau s of a segment to `at`."""
-    if presses and touches(t.motion, LEFT) and touches(t.motion, RIGHT):
+    if presses and touches(t, LEFT) and touches(t, RIGHT):
         return
-    write_flows(t.motion, tau, t.flows)
+    write_flows(t, tau)
     for body in (LEFT, OBJECT, RIGHT):
-        if not (presses and touches(t.motion, body)):
-            fly_tangent(t.motion, t.rates, t.flows, body)
-
-
-@kernel
-def pass_flight(t: Tangents, begin: float, span: float) -> None:
-    """Move the tangents over a flight, and write the outputs on the way."""
-    while next_output(t.outputs) < t.outputs.numbers[Number.TIME]:
-        fly_free(t, False, since(t.outputs, begin, span))
-        write_output(t.motion, t.outputs, t.rates)
-    fly_free(t, False, span)
+        if not (presses and touches(t, body)):
+            fly_tangent(t, body)
 
 
 @kernel
 def pass_step(t: Tangents, begin: float, span: float, s: float, unit: float, n: int) -> None:
     """Move the tangents over a Taylor step, in parts where their series end later than those of the run."""
-    motion, rates, left = t.motion, t.rates, s
-    step = Step(Order(n, 0.0, 0), unit, touches(motion, LEFT), touches(motion, RIGHT))
+    step = Step(Order(n, 0.0, 0), unit, touches(t, LEFT), touches(t, RIGHT))
     while True:
-        expand_tangents(motion, rates, t.table, n)
-        part = exact_length(motion, t.table, n, left)
-        ends = part == left
-        reached = span if ends else value_and_rate(motion.c[Lane.TIME :: LANES], n, part)[0]
-        while next_output(t.outputs) < (t.outputs.numbers[Number.TIME] if ends else begin + reached):
-            tau = since(t.outputs, begin, span)
+        expand_tangents(t, n)
+        part = exact_length(t, n, s)
+        ends = part == s
+        reached = span if ends else value_and_rate(t.c[Lane.TIME :: LANES], n, part)[0]
+        while next_output(t) < (t.numbers[Number.TIME] if ends else begin + reached):
+            tau = since(t, begin, span)
             fly_free(t, True, tau)
-            at = invert_time(motion.c, t.table.products[0], step, tau, part, reached)
-            step_tangents(motion, rates, t.table, n, at)
-            write_output(motion, t.outputs, rates)
+            at = invert_time(t.c, t.products[0], step, tau, part, reached)
+            step_tangents(t, n, at)
+            write_output(t)
         if ends:
             fly_free(t, True, span)
-            step_tangents(motion, rates, t.table, n, part)
+            step_tangents(t, n, part)
             return
-        copy_matrix(rates.at, rates.x)  # what flies stays at the begin
-        step_tangents(motion, rates, t.table, n, part)
-        copy_matrix(rates.x, rates.at)
-        shift(motion.c, n, part)
-        left -= part
+        copy_matrix(t.at, t.x)  # what flies stays at the begin
+        step_tangents(t, n, part)
+        copy_matrix(t.x, t.at)
+        shift(t.c, n, part)
+        s -= part
 
 
 @kernel
 def pass_segment(t: Tangents, kind: int, begin: float, span: float, s: float, unit: float, n: int) -> None:
-    """Move the tangents over a segment."""
-    act(t.motion.mode, t.rates, t.inputs)
-    if kind == Kind.FLIGHT:
-        pass_flight(t, begin, span)
+    """Move the tangents over a segment, or over a time at rest, and write the outputs on the way."""
+    end = t.numbers[Number.TIME]
+    act(t)
+    if kind == REST:
+        while next_output(t) <= end:
+            rest_tangent(t, since(t, begin, span))
+            write_output(t)
+        rest_tangent(t, span)
+    elif kind == Kind.FLIGHT:
+        while next_output(t) < end:
+            fly_free(t, False, since(t, begin, span))
+            write_output(t)
+        fly_free(t, False, span)
     else:
         pass_step(t, begin, span, s, unit, n)
-    while next_output(t.outputs) <= t.outputs.numbers[Number.TIME]:  # events are: each ends its segment
-        write_output(t.motion, t.outputs, t.rates)
-    copy_matrix(t.rates.x, t.rates.at)
+    while next_output(t) <= end:  # events are: each ends its segment
+        write_output(t)
+    copy_matrix(t.x, t.at)
     for side in (LEFT, RIGHT):
-        if t.motion.mode[side] == Pair.BEGINNING or t.motion.mode[side] == Pair.LEAVING:
-            add_neglected(t.motion, t.rates.x, side, span)
-
-
-@kernel
-def remember(t: Tangents) -> None:
-    """Keep what the next segment begins with."""
-    t.outputs.counts[Count.SLIDE] = t.motion.mode[OBJECT]
-    t.outputs.numbers[Number.FORCE] = t.motion.bodies[OBJECT, Of.FORCE]
-    for place in range(t.motion.y.shape[0]):
-        t.motion.before[place] = t.motion.y[place]
+        if kind != REST and (t.mode[side] == Pair.BEGINNING or t.mode[side] == Pair.LEAVING):
+            add_neglected(t, side, span)
 
 
 @door
@@ -265,20 +219,19 @@ def propagate(address: int, kind: int, span: float, s: float, unit: float, degre
     """
     t = tangents_at(address)
     if kind == FINISH:
-        copy_matrix(t.rates.at, t.rates.x)
-        while next_output(t.outputs) < math.inf:
-            write_output(t.motion, t.outputs, t.rates)
+        copy_matrix(t.at, t.x)
+        while next_output(t) < math.inf:
+            write_output(t)
         return 0
-    if t.outputs.counts[Count.SLIDE] == UNSEEN:
-        check_glide(t.motion, t.rates, t.outputs)
-    clock = t.motion.clock
-    since_tick = clock[0] + clock[1] - (0.0 if kind == REST else span)
-    pass_friction(t.motion, t.rates.x, t.outputs, t.outputs.counts[Count.DRIVEN] != 0 and since_tick <= 0.0)
-    enter_ticks(t, clock[2])
-    t.outputs.numbers[Number.TIME] = (clock[0] + clock[1]) + clock[2]
-    if kind == REST:
-        pass_rest(t, span)
-    else:
-        pass_segment(t, kind, (clock[0] + clock[1] - span) + clock[2], span, s, unit, degree)
-    remember(t)
+    if t.counts[Count.SLIDE] == UNSEEN:
+        check_glide(t)
+    now, interval = t.clock[0] + t.clock[1], t.clock[2]
+    since_tick = now if kind == REST else now - span
+    pass_friction(t, t.counts[Count.DRIVEN] != 0 and since_tick <= 0.0)
+    enter_ticks(t, interval)
+    t.numbers[Number.TIME] = now + interval + (span if kind == REST else 0.0)
+    pass_segment(t, kind, since_tick + interval, span, s, unit, degree)
+    t.counts[Count.SLIDE], t.numbers[Number.FORCE] = t.mode[OBJECT], t.bodies[OBJECT, Of.FORCE]
+    for place in range(t.y.shape[0]):
+        t.before[place] = t.y[place]
     return 0

@@ -1,4 +1,4 @@
-"""A run with its tangents: the observer that carries them along, with its memory."""
+"""The observer that carries the tangents of a run along, with its memory."""
 
 from __future__ import annotations
 
@@ -18,16 +18,20 @@ from grasp_ros.sensitivity.tangents import Count, Number, tangents_of
 
 
 class Carrier:
-    """Carries the tangents of one run along; an observer of `exact`.
+    """Carries the tangents of one run along, as the observer of its integrator.
 
     Parameters
     ----------
+    scene : Scene
     integrator : Integrator
+        Of its run, which has not begun.
     directions : Directions
     times : array (m,), s
         Output times, in any order.
+    sampled : bool
+        Whether commands are held.
     e : int
-        How many of them, the last ones, are times of events.
+        How many of the output times, the last ones, are times of events.
 
     Attributes
     ----------
@@ -39,28 +43,28 @@ class Carrier:
         At events, of each body: its mass in kg, infinite while it sticks, the constant force on it in N, and its rates.
     """
 
-    def __init__(self, integrator: Integrator, directions: Directions, times: Array, e: int = 0) -> None:
-        self._tangents = tangents_of(integrator.plant, integrator.records, directions, times, e)
-        rates, outputs = self._tangents.rates, self._tangents.outputs
-        self.x, self.out, self.forces = rates.x[:, : directions.state.shape[1]], outputs.out, outputs.forces
-
-    def drive_by(self, scene: Scene, directions: Directions, sampled: bool) -> None:
-        """Let inputs change at ticks: commands that are held, and external forces."""
-        outputs, system = self._tangents.outputs, scene.system
-        outputs.counts[Count.DRIVEN], outputs.numbers[Number.PERIOD] = 1, scene.time_of(1)
+    def __init__(self, scene: Scene, integrator: Integrator, directions: Directions, times: Array, sampled: bool,
+                 e: int = 0) -> None:
+        system, n, changes = scene.system, directions.state.shape[1], directions
+        if not sampled:
+            changes = directions.closed_loop(system)
+        tangents = tangents_of(integrator.plant, integrator.records, changes, times, e)
+        if sampled or system.external:
+            tangents.counts[Count.DRIVEN], tangents.numbers[Number.PERIOD] = 1, scene.time_of(1)
         if sampled:
             normals = np.zeros((scene.ticks + 1, 2, 2))
             for side, law in system.laws.items():
                 if law.seed is not None:
                     normals[:, side] = normals_over(law.seed, 0, scene.ticks + 1)
-            self._tangents = self._tangents._replace(inputs=self._tangents.inputs._replace(
-                control=system.law_rows, control_rates=directions.laws, normals=normals,
-                waiting=np.zeros((system.delay, 2, self.x.shape[1]))))
+            tangents = tangents._replace(control=system.law_rows, control_rates=directions.laws, normals=normals,
+                                         waiting=np.zeros((system.delay, 2, n)))
+        self._tangents, self.x, self.out, self.forces = tangents, tangents.x[:, :n], tangents.out, tangents.forces
+        integrator.observer = self
 
     def attach(self, tables: Tables) -> Integers:
         """What a run with this workspace calls after each segment."""
-        if tables.c is not self._tangents.motion.c:  # a run in many pieces brings the same ones
-            self._tangents = self._tangents._replace(motion=self._tangents.motion._replace(c=tables.c))
+        if tables.c is not self._tangents.c:  # a run in many pieces brings the same ones
+            self._tangents = self._tangents._replace(c=tables.c)
             self._block = block_of(self._tangents)
         return np.array([address_of(propagate), self._block.ctypes.data])
 
@@ -72,5 +76,5 @@ class Carrier:
     @property
     def corner(self) -> float | None:
         """First time in s at which one-sided derivatives differ; None: there is none."""
-        corner = float(self._tangents.outputs.numbers[Number.CORNER])
+        corner = float(self._tangents.numbers[Number.CORNER])
         return corner if math.isfinite(corner) else None

@@ -59,7 +59,7 @@ def _growth(scene: Scene, places: list[int], accuracy: float, pieces: int) -> Ar
     start, grown = np.zeros((6, n)), np.zeros(n)
     start[places, range(n)] = 1.0
     integrator = Integrator(scene.system, continuous=True, accuracy=accuracy)
-    integrator.observer = carrier = Carrier(integrator, no_directions(n)._replace(state=start), np.zeros(0))
+    carrier = Carrier(scene, integrator, no_directions(n)._replace(state=start), np.zeros(0), False)
     stuck = False
     for piece in range(pieces):
         begin = scene.duration * piece / pieces

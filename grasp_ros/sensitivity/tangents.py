@@ -78,9 +78,10 @@ class Number(IntEnum):
     FORCE = 3  # constant force on the object in the last segment, its friction in it, N
 
 
-class TangentMotion(NamedTuple):
-    """The segment that the run has just made."""
+class Tangents(NamedTuple):
+    """The tangents of a run with n directions, in some arrays with zeros up to a multiple N of HALF."""
 
+    # the segment that the run has just made
     c: Array  # its Taylor table: the run has done with it
     y: Array  # (8,) state at its end
     mode: Integers  # (3,)
@@ -89,30 +90,13 @@ class TangentMotion(NamedTuple):
     pairs: Array  # (2, 2)
     before: Array  # (8,) state at its begin
 
-
-class TangentRates(NamedTuple):
-    """Derivatives of its state, and of the numbers that act in it; with zeros up to a multiple N of HALF."""
-
+    # derivatives of the state, and of the numbers that act in the segment
     x: Array  # (6, N) of the state at its begin, then at its end
     at: Array  # (6, N) scratch: the same at some time of the segment
     acting: Array  # (3, 4, N) of the bodies
     law: Array  # (2, 2, N) of H and p
 
-
-class TangentTable(NamedTuple):
-    """Scratch: the series of a Taylor step."""
-
-    series: Array  # (N / HALF BLOCK,) of the tangents, HALF directions after another
-    rows: Array  # (ROWS, TERMS) of the run, see `Row`
-    weights: Array  # (5 WEIGHTS,) of the run, see `Weight`
-    factors: Array  # (2, ROOM)
-    products: Array  # (3, ROOM) see `base_series.pair_series`
-    sums: Array  # (N / HALF SUMS,) of products
-
-
-class Inputs(NamedTuple):
-    """What acts on the bodies, and its derivatives."""
-
+    # what acts on the bodies, and its derivatives
     given: Array  # (3, 4, n) of the numbers of the bodies, without held inputs
     force: Array  # (3, n) of the inputs that are held
     coulomb: Array  # (n,) of the dry friction
@@ -122,28 +106,23 @@ class Inputs(NamedTuple):
     waiting: Array  # (delay, 2, n) of commands on their way: a ring
     external: Array  # (ticks, 3, n)
 
-
-class TangentOutputs(NamedTuple):
-    """What is written, and where it stands."""
-
+    # what is written, and where it stands
     counts: Integers  # see `Count`
     numbers: Array  # see `Number`
     grid: Array  # (m,) output times, s, ascending
-    rows: Integers  # (m,) where each is written
+    order: Integers  # (m,) where each is written
     out: Array  # (m, 6, n)
     forces: Array  # (e, 3, 2 + n) in the last e rows: mass of each body, constant force on it, and its derivatives
 
-
-class Tangents(NamedTuple):
-    """The tangents of a run with n directions, in parts: a kernel that is handed all of them compiles for minutes."""
-
-    motion: TangentMotion
-    rates: TangentRates
-    table: TangentTable
-    inputs: Inputs
-    outputs: TangentOutputs
-    matrices: Array  # (5, 6, 6) scratch
-    flows: Array  # (FLOWS,) scratch, see `flight.Flow`
+    # scratch: the series of a Taylor step, and what moves a body in flight or at rest
+    series: Array  # (N / HALF BLOCK,) of the tangents, HALF directions after another
+    rows: Array  # (ROWS, TERMS) of the run, see `Row`
+    weights: Array  # (5 WEIGHTS,) of the run, see `Weight`
+    factors: Array  # (2, ROOM)
+    products: Array  # (3, ROOM) see `base_series.pair_series`
+    sums: Array  # (N / HALF SUMS,) of products
+    matrices: Array  # (5, 6, 6)
+    flows: Array  # (FLOWS,) see `flight.Flow`
 
 
 def _padded(array: Array) -> Array:
@@ -162,14 +141,14 @@ def tangents_of(plant: Plant, state: State, changes: Directions, times: Array, e
     n, m, order, x = changes.state.shape[1], len(times), np.argsort(times, kind="stable"), _padded(changes.state)
     wide, counts, numbers = x.shape[1], np.zeros(len(Count), dtype=np.int64), np.zeros(len(Number))
     counts[Count.TICK], counts[Count.SLIDE], numbers[Number.CORNER] = -1, UNSEEN, math.inf
-    motion = TangentMotion(np.zeros(0), state.y, state.mode, state.clock, plant.bodies, plant.pairs, state.y.copy())
-    rates = TangentRates(x, zeros(STATES, wide), zeros(3, 4, wide), _padded(changes.pairs))
-    table = TangentTable(zeros(wide // HALF * BLOCK), np.zeros((ROWS, TERMS)), zeros(5 * WEIGHTS), zeros(2, ROOM),
-                  zeros(3, ROOM), zeros(wide // HALF * SUMS))
-    inputs = Inputs(changes.bodies, np.zeros((3, n)), changes.coulomb[0], np.zeros((2, COLUMNS)),
-                    np.zeros((2, COLUMNS, n)), np.zeros((1, 2, 2)), np.zeros((0, 2, n)), changes.external)
-    outputs = TangentOutputs(counts, numbers, times[order], order, np.zeros((m, STATES, n)), np.zeros((e, 3, 2 + n)))
-    return Tangents(motion, rates, table, inputs, outputs, np.zeros((5, STATES, STATES)), zeros(FLOWS))
+    return Tangents(
+        np.zeros(0), state.y, state.mode, state.clock, plant.bodies, plant.pairs, state.y.copy(),
+        x, zeros(STATES, wide), zeros(3, 4, wide), _padded(changes.pairs),
+        changes.bodies, np.zeros((3, n)), changes.coulomb[0], np.zeros((2, COLUMNS)), np.zeros((2, COLUMNS, n)),
+        np.zeros((1, 2, 2)), np.zeros((0, 2, n)), changes.external,
+        counts, numbers, times[order], order, np.zeros((m, STATES, n)), np.zeros((e, 3, 2 + n)),
+        zeros(wide // HALF * BLOCK), np.zeros((ROWS, TERMS)), zeros(5 * WEIGHTS), zeros(2, ROOM), zeros(3, ROOM),
+        zeros(wide // HALF * SUMS), np.zeros((5, STATES, STATES)), zeros(FLOWS))
 
 
 tangents_at = reader(typeof(tangents_of(*new_run()[2:], no_directions(1), np.zeros(0), 0)))

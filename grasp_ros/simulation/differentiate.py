@@ -91,7 +91,7 @@ def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
     changes, grid, events = directions(scene, keys, sampled), run.t, run.event_table
     times = np.concatenate([grid, events[:, Entry.TIME]])
     integrator = integrator_of(run)
-    carrier = carry(scene, integrator, changes, times, sampled, len(events))
+    carrier = Carrier(scene, integrator, changes, times, sampled, len(events))
     states = complete(scene, integrator, sampled, times)
     carrier.finish()
     m = len(grid)
@@ -99,16 +99,6 @@ def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
     states[:, system.absent_columns] = carrier.out[:, system.absent_columns] = np.nan
     check_same(run, grid, states[:m], integrator.event_table)
     return Sensitivity(scene, tuple(keys), grid, states[:m], events, carrier.out[:m], at_events, carrier.corner)
-
-
-def carry(scene: Scene, integrator: Integrator, changes: Directions, times: Array, sampled: bool, e: int = 0
-          ) -> Carrier:
-    """Let a run carry its tangents along, for output times (m,) in s, in any order; the last e are those of events."""
-    carrier = Carrier(integrator, changes if sampled else changes.closed_loop(scene.system), times, e)
-    if sampled or scene.system.external:
-        carrier.drive_by(scene, changes, sampled)
-    integrator.observer = carrier
-    return carrier
 
 
 def complete(scene: Scene, integrator: Integrator, sampled: bool, times: Array) -> Array:

@@ -13,7 +13,8 @@ from grasp_ros.exact.integrator import Integrator
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.directions import directions
-from grasp_ros.simulation.differentiate import carry, complete
+from grasp_ros.sensitivity.run import Carrier
+from grasp_ros.simulation.differentiate import complete
 from grasp_ros.simulation.simulate import GRID_POINTS, simulate
 from lab.studies import pages
 from lab.studies.turns import in_turn
@@ -44,7 +45,7 @@ def run() -> str:
 def states_alone(scene: Scene, keys: Sequence[str], times: Array) -> Array:
     """Derivatives (m, 6, n) of the states alone: one run."""
     integrator = Integrator(scene.system, continuous=True)
-    carrier = carry(scene, integrator, directions(scene, keys, False), times, False)
+    carrier = Carrier(scene, integrator, directions(scene, keys, False), times, False)
     complete(scene, integrator, False, times)
     carrier.finish()
     return carrier.out
