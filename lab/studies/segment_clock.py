@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import time
+from typing import NamedTuple
 
 import numpy as np
 from numba import cfunc, typeof
@@ -17,13 +18,21 @@ COUNT, FIRST = 2, 3  # places, behind the seconds and nanoseconds of the clock; 
 MONOTONIC = time.CLOCK_MONOTONIC
 clock_gettime = ctypes.CDLL(None).clock_gettime
 clock_gettime.argtypes = ctypes.c_int, ctypes.c_size_t
-places_at = reader(typeof((np.zeros(0, dtype=np.int64),)))
+
+
+class Clock(NamedTuple):
+    """What it is called with."""
+
+    places: Integers  # (FIRST + 2 n,)
+
+
+clock_at = reader(typeof(Clock(np.zeros(0, dtype=np.int64))))
 
 
 @cfunc(SIGNATURE)  # type: ignore[untyped-decorator]
 def read_clock(context: int, kind: int, t: float, s: float, unit: float, degree: int) -> int:
     """Note the kind of a segment, and when it was over."""
-    place = places_at(context)[0]
+    place = clock_at(context).places
     clock_gettime(MONOTONIC, place.ctypes.data)
     row = FIRST + 2 * place[COUNT]
     place[row], place[row + 1] = kind, place[0] * NANOSECONDS + place[1]
@@ -36,7 +45,7 @@ class SegmentClock:
 
     def __init__(self, most: int) -> None:
         self._places: Integers = np.zeros(FIRST + 2 * most, dtype=np.int64)
-        self._block = block_of((self._places,))
+        self._block = block_of(Clock(self._places))
 
     def attach(self, tables: Tables) -> Integers:
         """What a run calls after each segment."""

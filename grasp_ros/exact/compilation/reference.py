@@ -7,7 +7,6 @@ which was half of what was compiled for an observer.
 from typing import Any
 
 from numba.core import cgutils, types
-from numba.core.types.containers import NamedTuple
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, lower_getattr_generic, models, register_model
 
@@ -18,12 +17,6 @@ class Reference(types.Type):
     def __init__(self, record: Any) -> None:
         self.record = record
         super().__init__(f"Reference({record})")
-
-    def field(self, name: str) -> tuple[int, Any]:
-        """Index and type of a field; a record within it is referred to, too."""
-        index = self.record.fields.index(name)
-        kind = self.record.types[index]
-        return index, Reference(kind) if isinstance(kind, NamedTuple) else kind
 
 
 @register_model(Reference)
@@ -37,11 +30,9 @@ class _Fields(AttributeTemplate):
     key = Reference
 
     def generic_resolve(self, reference: Reference, name: str) -> Any:
-        return reference.field(name)[1]
+        return reference.record.types[reference.record.fields.index(name)]
 
 
 @lower_getattr_generic(Reference)  # type: ignore[untyped-decorator]
 def _field(_: Any, builder: Any, reference: Reference, address: Any, name: str) -> Any:
-    index, kind = reference.field(name)
-    place = cgutils.gep_inbounds(builder, address, 0, index)
-    return place if isinstance(kind, Reference) else builder.load(place)
+    return builder.load(cgutils.gep_inbounds(builder, address, 0, reference.record.fields.index(name)))

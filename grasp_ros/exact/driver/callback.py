@@ -7,7 +7,6 @@ called when the segment is over and before its transitions, so that modes and bo
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cache
 from typing import Any
 from weakref import finalize
@@ -44,20 +43,14 @@ def address_of(function: Any) -> int:
 
 
 def block_of(record: Any) -> Integers:
-    """Memory image, as in kernels, of a record of arrays or of records of them; valid as long as these live."""
-    block = np.array([*_words(record)])
+    """Memory image, as in kernels, of a record of arrays; valid as long as these live."""
+    # A numba array: meminfo, parent (none), size, itemsize, data, shape, strides.
+    block = np.array([word for part in record for word in (
+        0, 0, part.size, part.itemsize, part.ctypes.data, *part.shape, *part.strides)])
     if not COMPILED:
         _RECORDS[block.ctypes.data] = record
         finalize(block, _RECORDS.pop, block.ctypes.data)
     return block
-
-
-def _words(record: Any) -> Iterator[int]:
-    for part in record:
-        if isinstance(part, tuple):
-            yield from _words(part)
-        else:  # a numba array: meminfo, parent (none), size, itemsize, data, shape, strides
-            yield from (0, 0, part.size, part.itemsize, part.ctypes.data, *part.shape, *part.strides)
 
 
 def reader(kind: Any) -> Any:
