@@ -69,6 +69,17 @@ def test_a_node_takes_what_it_dumps(loop: tuple[Any, ...]) -> None:
         assert unknown.reason == "peer_timeout: no such parameter; did you mean peer_timeout_s?"
 
 
+@pytest.mark.parametrize("text", ["true", "yes", "1_0", "null", "[1.0]", "", "[", "&a 1.0", "1" + "0" * 399])
+def test_a_text_that_is_no_number_is_refused(loop: tuple[Any, ...], text: str) -> None:
+    controller = loop[1]
+    gain = next(name for name, value in controller._parameters.items() if "." in name and type(value.value) is float)
+    held = controller.get_parameter(gain).value
+    refused = controller.set_parameters_atomically([Parameter(gain, value=text)])
+    assert not refused.successful
+    assert f"{gain}: {text!r} is not allowed; allowed: a number" in refused.reason
+    assert controller.get_parameter(gain).value == held
+
+
 def test_what_rclpy_cannot_read_ends_no_node(context: rclpy.Context) -> None:
     """Its own callbacks raise for a parameter of a type that there is none, and for a negative time."""
     given = [Parameter("use_sim_time", value=True)]

@@ -21,6 +21,7 @@ from rclpy.subscription import Subscription
 from grasp_ros.graph.parameters import FREE, PARAMETERS
 from grasp_ros.graph.ros import messages
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.given import plain
 from grasp_ros.scene import Scene, strict_yaml
 from grasp_ros.scene.suggestion import allowed
 
@@ -136,9 +137,9 @@ class ParameterNode(Node):
             held, declared = _plain(self.get_parameter(name).value), self.describe_parameter(name)
             value = _plain(parameter.value)
             if declared.dynamic_typing and type(held) in (int, float) and type(value) in (int, str):
-                with suppress(ValueError, TypeError):
-                    value = float(strict_yaml.load(str(value)))
-                    parameter = RosParameter(name, value=value)
+                number = _number(value)
+                if number is not None:
+                    value, parameter = number, RosParameter(name, value=number)
             if declared.read_only or name == SIM_TIME:
                 if value == held:
                     continue
@@ -154,6 +155,14 @@ class ParameterNode(Node):
 def _plain(value: Any) -> Any:
     """Value of a parameter, a list where rclpy has an array."""
     return list(value) if isinstance(value, array) else value
+
+
+def _number(value: int | str) -> float | None:
+    """A number, also one in a text as YAML has it; None for any other text."""
+    with suppress(ValueError, OverflowError):
+        found = plain(strict_yaml.load(value) if isinstance(value, str) else value)
+        return None if found is None else float(found)
+    return None
 
 
 @contextmanager
