@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from graphs import rewritten
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType
 from processes import DEADLINE, wait_for
@@ -25,6 +26,7 @@ from sensor_msgs.msg import JointState
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
+from grasp_ros.graph.bag.chunks import HEAD
 from grasp_ros.graph.bag.verify import laws_of, verify
 from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.ros import messages
@@ -144,6 +146,20 @@ def test_a_bag_of_another_make_is_read_or_refused_and_not_called_damaged(
     elif "by_topic" in options:
         assert command("recover", "new.mcap").returncode == 0
         assert words in command("verify", "new_recovered").stdout
+
+
+def test_a_record_longer_than_any_of_a_bag_is_refused_and_left_out_of_a_new_bag(
+    two_runs: tuple[Path, Path], tmp_path: Path, command: Any
+) -> None:
+    whole, attached = (two_runs[0] / "bag" / "bag.mcap").read_bytes(), 2**23 + 1
+    long = HEAD.pack(Opcode.ATTACHMENT, attached) + bytes(attached)
+    (tmp_path / "new.mcap").write_bytes(whole[:8] + long + whole[8:-8])  # without its end: no checksum of the file
+    words = f"a record of {attached} bytes; allowed: at most {2**23}"
+    assert f"{words}, as `rosbags-convert" in command("verify", "new.mcap").stderr
+    recovered = command("recover", "new.mcap")
+    assert recovered.returncode == 0
+    assert words in recovered.stdout + recovered.stderr
+    assert "3001 states follow" in command("verify", "new_recovered").stdout
 
 
 @pytest.mark.parametrize(("without", "tick", "lost"), [

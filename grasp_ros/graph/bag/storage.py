@@ -81,10 +81,9 @@ class Storage:
             (self._read_summary if self._salvage else self._check_sums)()
         offset = len(MAGIC)
         while offset < len(data):
-            end = self._end_of(offset)
             try:
+                end = self._end_of(offset)
                 if end is None:
-                    self._refuse_long(offset)
                     raise EOFError("the rest of a record is missing")
                 opcode, body = data[offset], data[offset + HEAD.size : end]
                 if opcode == Opcode.DATA_END:
@@ -113,19 +112,16 @@ class Storage:
             self._refuse("the end of its data is not as long as it should be")
 
     def _end_of(self, offset: int) -> int | None:
-        """Where a record ends; None if it is not all there."""
+        """Where a record ends; None if it is not all there. A longer one than any of a bag is an AnotherMakeError."""
         if offset + HEAD.size > len(self._data):
             return None
         _, length = HEAD.unpack_from(self._data, offset)
-        end = offset + HEAD.size + length
-        return int(end) if length <= RECORD_BYTES and end <= len(self._data) else None
-
-    def _refuse_long(self, offset: int) -> None:
-        """Refuse a record that is all there, but longer than any of a bag."""
-        if offset + HEAD.size <= len(self._data):
-            _, length = HEAD.unpack_from(self._data, offset)
-            if RECORD_BYTES < length <= len(self._data) - offset - HEAD.size:
-                raise AnotherMakeError(f"a record of {length} bytes; allowed: at most {RECORD_BYTES}")
+        end = int(offset + HEAD.size + length)
+        if end > len(self._data):
+            return None
+        if length > RECORD_BYTES:
+            raise AnotherMakeError(f"a record of {length} bytes; allowed: at most {RECORD_BYTES}")
+        return end
 
     def _read(self, opcode: int, body: bytes) -> Iterator[Stored]:
         stream = ReadDataStream(BytesIO(body))
@@ -211,9 +207,9 @@ class Storage:
         """Offset of the next chunk that is whole; for damage that hides where records begin."""
         while (mark := self._data.find(CHUNK_MARK, offset + CHUNK_MARK_AT)) >= 0:
             offset = mark - CHUNK_MARK_AT
-            end = self._end_of(offset)
-            if end is not None and self._data[offset] == Opcode.CHUNK:
-                with suppress(*DAMAGE):
+            with suppress(*DAMAGE):
+                end = self._end_of(offset)
+                if end is not None and self._data[offset] == Opcode.CHUNK:
                     unpack(self._data[offset + HEAD.size : end])
                     return offset
             offset += 1
