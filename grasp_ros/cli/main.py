@@ -24,7 +24,7 @@ from grasp_ros.cli.commands import COMMANDS, overview
 from grasp_ros.cli.parser import Command, Parser, add_levels, shortened
 from grasp_ros.graph.bag.disk import FULL
 from grasp_ros.graph.stopping import is_signalled, on_signals, raise_on_signals, stop_if_signalled
-from grasp_ros.physics.errors import Failed, Refused, described
+from grasp_ros.physics.errors import Refused, described
 
 HELP = f"""\
 Simulate, run, inspect and draw a grasp that collides.
@@ -105,7 +105,7 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
         return status
     except Refused as error:
         print(shortened(f"grasp: {error}"), file=sys.stderr)
-        return 1 if isinstance(error, Failed) else 2
+        return error.exit_status
     except KeyboardInterrupt as stop:
         print(f"grasp: interrupted{stop}", file=sys.stderr)
         return 130

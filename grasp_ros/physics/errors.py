@@ -36,6 +36,8 @@ class Refused(ValueError):  # noqa: N818 - it is what happens to the input, and 
     The middle of a very long value is left out, and control characters are shown as escapes.
     """
 
+    exit_status = 2
+
     def __init__(self, sentence: str) -> None:
         if len(sentence) > LONGEST:
             sentence = f"{sentence[: LONGEST // 2]} ... {sentence[-LONGEST // 2 :]}"
@@ -44,3 +46,5 @@ class Refused(ValueError):  # noqa: N818 - it is what happens to the input, and 
 
 class Failed(Refused):
     """What was accepted and has failed: nobody answers, a law of the user's gives no command."""
+
+    exit_status = 1

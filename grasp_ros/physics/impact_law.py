@@ -2,8 +2,8 @@
 
     fw = H u^(3/2) (1 + p u')   if u >= 0 and u' >= -1/p, else 0     (6), (7), (10)
 
-u > 0 is penetration, u' > 0 approach, H in N/m^1.5, p in s/m. Each function takes floats or NumPy arrays, and
-`exact.impact` compiles the same source for the kernels. `model.impact_force` combines them for any u and u'.
+u > 0 is penetration, u' > 0 approach, H in N/m^1.5, p in s/m. All but `energy_quotient` take floats or NumPy arrays,
+and `exact.impact` compiles their source for the kernels. `model.impact_force` combines them for any u and u'.
 Another exponent changes this file, powers of w in `exact.contact.series` and `sensitivity.base_series`, and the key of
 H with its unit in `domain`, `scene.effects.contact` and `scene.parameter`. Tests: docs/oracles.md.
 

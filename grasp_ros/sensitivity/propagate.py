@@ -40,33 +40,47 @@ def impact_now(t: Tangents, side: Body) -> float:
 
 
 @kernel
-def pass_friction(t: Tangents, at_tick: bool) -> None:
-    """The jump of the tangents where the mode of an object under dry friction has changed.
+def turning_ratio(t: Tangents) -> float:
+    """Acceleration of an object that turns, after the turn, by that before it; nan if there was none before."""
+    push, new = impact_now(t, LEFT) - impact_now(t, RIGHT), t.bodies[OBJECT]
+    push -= new[Of.STIFFNESS] * t.before[X.O] + new[Of.DAMPING] * t.before[V.O]
+    first = push + t.numbers[Number.FORCE]  # under the constant force before
+    return (push + new[Of.FORCE]) / first if first != 0.0 else math.nan
 
-    Of one that stops just when inputs change nobody knows which of them would act on it.
+
+@kernel
+def friction_factor(t: Tangents, at_tick: bool) -> float:
+    """What the tangent of the object's velocity is multiplied by where the mode of its dry friction has changed.
+
+    It is nan where the one-sided derivatives differ. Of an object that stops just when inputs change nobody knows which
+    of them would act on it.
     """
-    before, now = t.counts[Count.SLIDE], t.mode[OBJECT]
-    if now == Slide.FREE or now == before:
-        return
-    factor, slid = 1.0, before == Slide.RIGHTWARD or before == Slide.LEFTWARD
+    before = t.counts[Count.SLIDE]
+    slid = before == Slide.RIGHTWARD or before == Slide.LEFTWARD
     if slid and at_tick:
-        factor = math.nan
-    elif now == Slide.STUCK:
-        factor = 0.0
-    elif slid:
-        push, new = impact_now(t, LEFT) - impact_now(t, RIGHT), t.bodies[OBJECT]
-        push -= new[Of.STIFFNESS] * t.before[X.O] + new[Of.DAMPING] * t.before[V.O]
-        first = push + t.numbers[Number.FORCE]  # under the constant force before
-        factor = (push + new[Of.FORCE]) / first if first != 0.0 else math.nan
-    elif before == UNSEEN and t.before[V.O] == 0.0:
+        return math.nan
+    if t.mode[OBJECT] == Slide.STUCK:
+        return 0.0
+    if slid:
+        return turning_ratio(t)
+    if before == UNSEEN and t.before[V.O] == 0.0:
         for j in range(t.x.shape[1]):
             if t.x[V.O, j] != 0.0:
-                factor = math.nan
-    if math.isnan(factor):  # the one-sided derivatives differ
+                return math.nan
+    return 1.0
+
+
+@kernel
+def pass_friction(t: Tangents, at_tick: bool) -> None:
+    """The jump of the tangents where the mode of an object under dry friction has changed."""
+    if t.mode[OBJECT] == Slide.FREE or t.mode[OBJECT] == t.counts[Count.SLIDE]:
+        return
+    factor = friction_factor(t, at_tick)
+    if math.isnan(factor):
         t.numbers[Number.CORNER] = min(t.numbers[Number.CORNER], t.numbers[Number.TIME])
-    else:
-        for j in range(t.x.shape[1]):
-            t.x[V.O, j] *= factor
+        return
+    for j in range(t.x.shape[1]):
+        t.x[V.O, j] *= factor
 
 
 @kernel

@@ -30,7 +30,7 @@ from grasp_ros.physics.layout import OBJECT, Body, Law, Of, Pair, U, V, X
 LOWEST, NEXT, HIGHEST = (whole(order) for order in (2, 3, 6))  # int64: numba compiles anew for each literal
 LONGEST = RANGES["duration"].high  # s
 UNDECIDED, NEVER = 0.0, math.inf  # orders if no derivative decides
-GROWTH = math.gamma(2.0 * EXPONENT + 1.0)  # its derivative of the order 2 EXPONENT is this times t^(2 EXPONENT)
+GROWTH = math.gamma(2.0 * EXPONENT + 1.0)  # derivative of that order of t^(2 EXPONENT); 2 EXPONENT is whole
 
 
 @kernel
@@ -56,38 +56,37 @@ def deciding_derivative(plant: Plant, state: State, side: Body) -> Deciding:
     If the other contact pushes, its force and the rate of its force are part of the derivatives 2 and 3, and no higher
     one is known. If it has no force yet, see `coming_push`, it closes this pair unless a lower derivative decides.
     """
+    own = own_difference(plant, state.y, side)
+    if plant.bodies[OBJECT, Of.MASS] == math.inf:
+        return own
     beside = other(side)
     presses = state.mode[beside] == Pair.CONTACT and state.y[U.L + beside] > 0.0
-    moves = plant.bodies[OBJECT, Of.MASS] < math.inf
-    if moves and presses and surface_factor(plant.pairs, state.y, beside, SURFACE) != 0.0:
+    if presses and surface_factor(plant.pairs, state.y, beside, SURFACE) != 0.0:
         push, pace = other_push(plant, state, side)
         found = first_difference(plant, state.y, side, push, pace, NEXT)
         return found if found.order < NEVER else Deciding(UNDECIDED, 0.0)
-    own = own_difference(plant, state.y, side)
-    order, push = coming_push(plant, state, beside) if moves else (NEVER, 0.0)
-    if own.order < order or order == NEVER:
+    coming = coming_push(plant, state, beside)
+    if own.order < coming.order or coming.order == NEVER:
         return own
-    return Deciding(order, push + own.value if own.order == order else push)
+    return Deciding(coming.order, coming.value + own.value if own.order == coming.order else coming.value)
 
 
 @kernel
-def coming_push(plant: Plant, state: State, beside: Body) -> tuple[float, float]:
-    """Which derivative of u of the other pair a pair without a force yet moves first: order, or NEVER, and value.
+def coming_push(plant: Plant, state: State, beside: Body) -> Deciding:
+    """The first derivative of u of the other pair that a pair without a force yet moves.
 
-    The force of a pair that closes from u = 0, by the power n of the time, grows with 3 n / 2; that of one at u' = -1/p
-    with u' + 1/p. Orders that are not whole have the value inf.
+    If the pair closes from u = 0 with the power n of the time, its force grows with the power 3 n / 2; at u' = -1/p it
+    grows as u' + 1/p does. A derivative whose order is not whole has the value inf.
     """
     y, mode, pair, mass = state.y, state.mode[beside], plant.pairs[beside], plant.bodies[OBJECT, Of.MASS]
     if mode not in (Pair.CONTACT, Pair.BEGINNING):
-        return NEVER, 0.0
+        return Deciding(NEVER, 0.0)
     u, (order, value) = y[U.L + beside], own_difference(plant, y, beside)
     if mode == Pair.CONTACT and u > 0.0:
-        return order + 1.0, elastic_force(pair[Law.HERTZIAN], u) * pair[Law.DISSIPATION] * value / mass
-    if approach(y, beside) != 0.0:
-        order = 1.0
-    at_rest = order == LOWEST
-    push = GROWTH * elastic_force(pair[Law.HERTZIAN], max(0.5 * value, 0.0)) / mass if at_rest else math.inf
-    return EXPONENT * order + 2.0, push
+        return Deciding(order + 1.0, elastic_force(pair[Law.HERTZIAN], u) * pair[Law.DISSIPATION] * value / mass)
+    power = 1.0 if approach(y, beside) != 0.0 else order
+    grows = GROWTH * elastic_force(pair[Law.HERTZIAN], max(0.5 * value, 0.0)) / mass if power == LOWEST else math.inf
+    return Deciding(EXPONENT * power + 2.0, grows)
 
 
 @kernel

@@ -39,7 +39,6 @@ from grasp_ros.physics.layout import (
 )
 
 ALONE = whole(-1)  # no second lane
-FIRST = whole(0)  # coefficient
 MOST_HALVINGS = 64  # of a step
 
 
@@ -95,7 +94,7 @@ def touch_of_open(tables: Tables, plant: Plant, state: State, n: int, side: Body
             if row[k] < 0.0:
                 break
             row[k] = 0.0
-    return first_rise(row, n, h, EPS * abs(row[FIRST]), work)
+    return first_rise(row, n, h, EPS * abs(row[0]), work)
 
 
 @inlined

@@ -102,7 +102,7 @@ class Remote(GraspNode):
                 print(answer, flush=True)
         except Refused as error:
             print(error, file=sys.stderr, flush=True)
-            return 1 if isinstance(error, Failed) else 2
+            return error.exit_status
         return 0
 
     def step(self, number: str = "1") -> str:
