@@ -11,12 +11,12 @@ import math
 from collections.abc import Callable
 from enum import IntEnum
 from functools import lru_cache
-from numbers import Real
 from typing import Any
 
 import numpy as np
 
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.given import plain
 from grasp_ros.physics.layout import BLOCK
 from grasp_ros.physics.model import Array
 
@@ -69,8 +69,9 @@ def command_of(answer: object, who: str, tick: int, time: float) -> float:
 
     A value that is no finite number is refused; `who` begins the message.
     """
+    found = plain(answer)
     try:
-        force = float(answer) if isinstance(answer, Real) else math.nan
+        force = math.nan if found is None else float(found)
     except OverflowError:
         force = answer = math.inf if answer > 0 else -math.inf  # type: ignore[operator]  # too long to be printed
     if not math.isfinite(force):

@@ -57,7 +57,8 @@ def losses(run: Trajectory) -> Losses:
     Raises
     ------
     Refused
-        If output times that count leave control periods out, and the run cannot be repeated, see `Trajectory.at`.
+        If output times that count leave control periods out, and the run cannot be repeated, see `Trajectory.at`, or
+        there are none.
     """
     row = as_row(check_run(run), "energy")
     return losses_of(at_every_tick(run) if row is None or needs_ticks(run) else run, row)

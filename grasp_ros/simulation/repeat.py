@@ -68,7 +68,9 @@ def check_same(run: Trajectory, grid: Array, states: Array, events: Array | None
 
 def at_every_tick(run: Trajectory) -> Trajectory:
     """A run with every control period among its output times, up to the last of these."""
-    if not len(run.t) or has_ticks(run, run.t[-1:]):
+    if not len(run.t):
+        raise Refused(f"{run.scene.name}: the run has no output times; allowed: one or more")
+    if has_ticks(run, run.t[-1:]):
         return run
     ticks = tick_times(run.scene)
     grid = np.union1d(ticks[ticks <= run.t[-1]], run.t)

@@ -80,7 +80,7 @@ def _checked(values: ArrayLike, t: Array) -> Array:
     found = np.asarray(values, dtype=float)
     if found.shape != t.shape or not np.isfinite(found).all():
         raise Refused(f"section: gives numbers of shape {found.shape} for times of shape {t.shape}, or some that are"
-                      " not finite; allowed: a finite number for each")
+                      " not finite, as the state of a body that is not there; allowed: a finite number for each")
     return found
 
 

@@ -115,6 +115,7 @@ def test_a_bag_is_a_table_and_a_motion_with_contacts(recorded: tuple[Path, Traje
     again = recording.simulated()
     assert again.state.tobytes() == recording.state.tobytes()
     assert again.inputs[:-1].tobytes() == recording.inputs[:-1].tobytes()
+    assert again.controllers == {"left": "as recorded", "right": "as recorded"}
     assert len(again.contacts("left")) == 1
     assert again.contacts("left").tobytes() == run.contacts("left").tobytes()
     gap = {name: np.delete(getattr(recording, name), 100, axis=0) for name in ("tick", "state", "effort", "command")}

@@ -194,7 +194,7 @@ def test_what_a_controller_raises_passes_through_with_its_tick(compiled: bool) -
         (lambda *_: "much", "answered 'much' at tick 0, t = 0.0 s; allowed: a finite number of N"),
         (lambda *_: None, "answered None at tick 0"),
         (numba.njit(lambda tick, time, x, v: 1.0 if tick < 3 else None), "answered None at tick 3"),
-        (lambda *_: np.zeros(1), "answered array"),
+        (lambda *_: np.zeros(1), "answered array"), (lambda *_: np.True_, "answered np.True_"),
         (lambda *_: -math.inf, "answered -inf"),
         (numba.njit(lambda tick, time, x, v: "much"), "float(int, float, float, float): No conversion from "),
         *((law, "too many positional arguments; allowed: a callable of tick, time, x and v")
@@ -207,6 +207,13 @@ def test_what_is_no_controller_is_refused(law: Any, words: str) -> None:
     with pytest.raises(Refused) as refusal:
         simulate(scenes.load("case_01"), controllers={"left": law})
     assert words in str(refusal.value)
+
+
+def test_a_number_of_numpy_without_dimension_is_a_command() -> None:
+    scene = scenes.load("case_01", [SHORT])
+    plainly, boxed = (simulate(scene, controllers={"left": lambda tick, time, x, v, kind=kind: kind(-x)})
+                      for kind in (float, np.asarray))
+    assert boxed.state.tobytes() == plainly.state.tobytes()
 
 
 @pytest.mark.parametrize("side", ["right", "middle"])

@@ -41,6 +41,11 @@ def test_what_is_lost_adds_up_to_what_V_c_has_fallen(name: str) -> None:
     assert (float(lost.friction) > 0.0) == (name == "friction")
 
 
+def test_losses_of_a_run_without_output_times_are_refused() -> None:
+    with pytest.raises(Refused, match="the run has no output times; allowed: one or more"):
+        losses(simulate(scenes.load("case_01"), sampled=True, grid=np.zeros(0)))
+
+
 @pytest.mark.parametrize("gains", [
     {"damping_Ns_per_m": 0.2, "velocity_gain_Ns_per_m": -0.2},
     {"damping_Ns_per_m": 0.2, "velocity_gain_Ns_per_m": -0.19999999999999996},

@@ -102,7 +102,8 @@ def test_a_graze_that_does_not_cross_is_no_crossing() -> None:
         (None, 0, "six weights of the state"), ("x", 0, "six weights of the state"),
         (lambda t, y: 1j * t, 0, "gives complex numbers; allowed: a finite number for each"),
         (lambda t, y: y, 0, "a finite number for each"),
-        (lambda t, y: np.full_like(t, np.nan), 0, "not finite"), (lambda t, y: None, 0, "a finite number for each"),
+        (lambda t, y: np.full_like(t, np.nan), 0, "not finite, as the state of a body that is not there"),
+        (lambda t, y: None, 0, "a finite number for each"),
     ],
 )
 def test_what_is_no_section_is_refused(section: Any, direction: int, sentence: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate, pairwise
 from pathlib import Path
@@ -158,13 +158,12 @@ class Recording(Tabular, Frozen):
         Raises
         ------
         Refused
-            If a tick is missing, or the plant was reset.
+            If a tick or a force is missing, or the plant was reset.
         """
         acted = acted_from(self.tick, self.effort)
-        if not self.whole:
-            raise Refused(f"{self.path}: allowed: a bag with every tick from the begin, and without a reset")
-        if len(self.tick) < 2 or not np.isfinite(acted[:-1]).all():
-            raise Refused(f"{self.path}: allowed: two ticks or more, and the forces that acted at each")
+        if not self.whole or len(self.tick) < 2 or not np.isfinite(acted[:-1]).all():
+            raise Refused(f"{self.path}: allowed: a bag with every tick from the begin, two or more, with the forces"
+                          " that acted at each, and without a reset")
         wait = self.scene.system.delay
         forces = np.vstack([acted[wait:-1], np.zeros((1 + wait, 2))]).T.tolist()  # from the last tick on nothing acts
         laws = {side: lambda tick, *_, own=forces[body]: own[tick] for side, body in SIDES.items()
@@ -174,7 +173,8 @@ class Recording(Tabular, Frozen):
             section, key = name.split(".")
             if key == "limit_N":  # it was raised: forces may exceed the first one
                 numbers[name] = max(force, numbers.get(name, self.scene.values[section][key]))
-        return simulate(self.scene.changed(numbers), sampled=True, controllers=laws, setting=self.running.accuracy)
+        run = simulate(self.scene.changed(numbers), sampled=True, controllers=laws, setting=self.running.accuracy)
+        return replace(run, controllers=dict.fromkeys(run.controllers, "as recorded"))
 
     @property
     def resets(self) -> int:
