@@ -120,10 +120,13 @@ def test_v_is_known_from_the_first_state_of_a_free_run_on(grasp_run: Any, tmp_pa
 
     After a reset the laws are announced anew, and nothing acts before.
     """
-    run = grasp_run("case_01", "--set", "time.duration_s=5", "--free-running", "1", "--no-check", "--no-figure")
+    run = grasp_run("case_01", "--set", "time.duration_s=200", "--free-running", "1", "--no-check", "--no-figure")
     wait_for(lambda: not ran(*GRASP, "ctl", "reset").returncode, "a reset")
+    assert not ran(*GRASP, "ctl", "pause").returncode
+    run.send_signal(signal.SIGINT)
     out, err = run.communicate(timeout=DEADLINE)
     assert run.returncode == 0, err
+    assert "refused" not in err  # what was on its way at the reset
     recording = bag.read(tmp_path / "run" / "bag")
     assert len(recording.starts) == 2
     assert recording.lyapunov[0, LYAPUNOV_NAMES.index("closed")] == 1.0

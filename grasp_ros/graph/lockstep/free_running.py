@@ -107,9 +107,10 @@ class FreeRunning:
         plant, held, command = self._plant, self._held[side], raw_command(cdr)
         stamp, force = command or (0, math.nan)
         tick = stamp // plant.scene.period_ns if stamp else plant.tick
-        if command is None or tick > plant.tick:
+        overtaken = plant.resets > 0 and not held.ever  # if it comes from before a reset
+        if command is None or (tick > plant.tick and not overtaken):
             plant.refuse("refused commands", topic)
-        elif tick < held.answers:
+        elif not held.answers <= tick <= plant.tick:
             plant.count("stale commands")
         elif self._limits.admit(topic, cdr):
             held.force, held.answers, held.ever = force, tick, True
