@@ -20,6 +20,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import BODIES, NAMES
 from grasp_ros.scene import Scene
+from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.files import decoding, reading
 from grasp_ros.scene.suggestion import allowed
 from grasp_ros.simulation.tables import COLUMNS, HEADS, TIME
@@ -29,7 +30,9 @@ from grasp_ros.simulation.trajectory_file import load
 
 CHANNELS = tuple(HEADS[column.name] for column in COLUMNS[:6])  # names of the states, in their order
 INPUTS = tuple(HEADS[f"input_{NAMES[body]}"] for body in sorted(BODIES))  # by body
+COMMANDS = tuple(HEADS[f"command_{name}"] for name in SIDES)
 T = HEADS[TIME.name]
+ROUNDED = 1e-6  # of a control period, by which times of a table may differ from the ticks
 FEWEST = 10  # samples
 Source: TypeAlias = str | os.PathLike[str] | Recording | Trajectory
 
@@ -117,16 +120,26 @@ def _of_trajectory(run: Trajectory, name: str) -> Measured:
 
 
 def _of_table(path: Path, scene: Scene) -> Measured:
-    """Columns as `Trajectory.to_csv` names them: the time, states, and the inputs of a scene that holds them."""
+    """Columns as `Trajectory.to_csv` names them: the time, states, and the inputs of a scene that holds them.
+
+    Inputs change at the ticks, from which their times may differ by a rounding. A body that nothing drives needs none.
+    """
     columns = _columns(path)
-    t = columns[T]
+    t, inputs = columns[T], None
     missing = np.full(len(t), np.nan)
     state = np.stack([columns.get(name, missing) for name in CHANNELS], axis=1)
-    held = scene.sampled and all(name in columns for name in INPUTS)
-    if held and not np.array_equal(t, tick_times(scene)[: len(t)]):
-        raise Refused(f"{path}: {T}: not the ticks of {scene.name}, every"
-                      f" {scene.time_of(1):g} s from 0 to {scene.duration:g} s, at which its inputs change")
-    inputs = np.stack([columns[name] for name in INPUTS], axis=1)[:-1] if held else None
+    if scene.sampled and not columns.keys().isdisjoint((*INPUTS, *COMMANDS)):
+        driven = {*scene.system.laws, *(force.body for force in scene.system.external)}
+        lacks = [name for body, name in enumerate(INPUTS) if body in driven and name not in columns]
+        if lacks:
+            raise Refused(f"{path}: no column {', '.join(lacks)}, the force that acted; allowed: one for each body that"
+                          " is driven, or neither forces nor commands")
+        ticks = tick_times(scene)[: len(t)]
+        if len(ticks) < len(t) or not (np.abs(t - ticks) <= ROUNDED * scene.time_of(1)).all():
+            raise Refused(f"{path}: {T}: not the ticks of {scene.name}, every"
+                          f" {scene.time_of(1):g} s from 0 to {scene.duration:g} s, at which its inputs change")
+        t, nothing = ticks, np.zeros(len(t))
+        inputs = np.stack([columns.get(name, nothing) for name in INPUTS], axis=1)[:-1]
     return Measured(str(path), scene, t, state, inputs, scene.sampled)
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -237,8 +238,9 @@ def _with_ends(place: Array) -> Array:
 def front(problem: DesignProblem, seed: int = 0, progress: Told | None = None) -> list[Design]:
     """The Pareto front of the two outcomes of a problem, from the first outcome's best on.
 
-    Each has the smallest first outcome for a bound on the second one; the bounds are even between the two ends. Of
-    choices that are equal in both the first is kept. See `search`.
+    Each has the smallest first outcome for a bound on the second one; the bounds are even between the two ends. One
+    under which no choice has the first outcome gives none. Of choices that are equal in both the first is kept. See
+    `search`.
     """
     if len(problem.minimise) != 2:
         raise Refused(f"minimise: {', '.join(problem.minimise)}; allowed: two outcomes for a curve")
@@ -254,7 +256,8 @@ def front(problem: DesignProblem, seed: int = 0, progress: Told | None = None) -
 
     most, least = add(first, problem.bounds).outcomes[second], add(second, problem.bounds).outcomes[second]
     for level in np.linspace(most, least, FRONT)[1:]:
-        add(first, (*problem.bounds, Bound(second, max(float(level), least))))
+        with suppress(Refused):
+            add(first, (*problem.bounds, Bound(second, max(float(level), least))))
     best: list[Design] = []  # than which no other one is better in one outcome and as good in the other
     for own in sorted(choices, key=lambda own: (own.outcomes[first], own.outcomes[second])):
         if not best or own.outcomes[second] < best[-1].outcomes[second]:

@@ -88,6 +88,11 @@ HEADS = {own.name: own.name + _ENDINGS[own.unit] for own in (TIME, *COLUMNS)}  #
 class Tabular:
     """Base of motions that can be taken as tables."""
 
+    def __repr__(self: Motion) -> str:
+        """In a line: whose motion, at how many times, and where it comes from."""
+        origin = ", ".join(f"{name} {value}" for name, value in self.origin.items())
+        return f"<{type(self).__name__} of {self.scene.name}: {len(self.t)} times, {origin}>"
+
     def dataset(self: Motion) -> Any:
         """An `xarray.Dataset` over `t`: states, forces, energies, with names and units as attributes.
 

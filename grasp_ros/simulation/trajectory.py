@@ -41,7 +41,7 @@ MOMENTS: dict[str, tuple[Transition, int]] = {  # arrays of a file with times of
 }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(Tabular, Frozen):
     """A simulated or recorded motion.
 

@@ -194,8 +194,8 @@ def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
                "set left_controller left_feedback.position_gain 9"]
     _, err = shell.communicate("\n".join(refused), timeout=DEADLINE)
     for words in ("steps", "not paused; allowed: step", "pause now: not allowed; allowed: pause, resume, step [N]",
-                  "nonsense: not allowed", "x: not allowed; allowed: a whole number >= 1",
-                  "0: not allowed; allowed: a whole number >= 1", "law: set at the start only",
+                  "nonsense: not allowed", "step x: not allowed; allowed: a whole number >= 1",
+                  "step 0: not allowed; allowed: a whole number >= 1", "law: set at the start only",
                   f"steps: {10 ** 20 - 1} is not allowed", "must not contain repeated", "Invalid service name",
                   f"steps: {10 ** 20} is not allowed", "steps: [1, 'a'] is not allowed",
                   f"steps: [{10 ** 20}] is not allowed",
@@ -273,4 +273,5 @@ def test_an_answer_that_is_no_plants_is_named(node: tuple[Any, SingleThreadedExe
 def test_a_number_of_steps_that_no_plant_can_do_is_refused() -> None:
     found = ran(*GRASP, "ctl", "step", "1" * 5000)
     assert found.returncode == 2
+    assert found.stderr.startswith("step 1111")
     assert found.stderr.endswith("1: not allowed; allowed: a whole number >= 1\n")

@@ -18,6 +18,7 @@ from grasp_ros.identification.measured import measured
 from grasp_ros.identification.result import whiteness
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
 
@@ -162,6 +163,18 @@ def test_a_table_says_what_its_run_says(tmp_path: Path, loop: tuple[str, ...]) -
     assert ((off > 0.01) & (off < 4.0)).all()
 
 
+def test_times_may_be_a_rounding_off_the_ticks_and_a_body_without_a_force_needs_no_column(tmp_path: Path) -> None:
+    run = simulate(load("case_01", ["time.duration_s=2", "loop={}"]))
+    table = np.column_stack([np.linspace(0.0, 2.0, 2001), run.state[:, ::2], run.inputs[:, [LEFT, RIGHT]]])
+    np.savetxt(tmp_path / "run.csv", table, fmt="%.17g", delimiter=",", comments="",
+               header="t_s,x_left_m,x_object_m,x_right_m,input_left_N,input_right_N")
+    assert (table[:, 0] != run.t).any()
+    found, same = (measured(data, run.scene) for data in (tmp_path / "run.csv", run))
+    assert found.t.tobytes() == same.t.tobytes()
+    assert found.inputs is not None
+    assert found.inputs.tolist() == same.inputs.tolist()  # type: ignore[union-attr]
+
+
 def test_masses_are_free_only_up_to_a_scale_without_a_known_force() -> None:
     scene = load("case_01", ["time.duration_s=1"])
     masses = ["left_arm.mass_kg", "object.mass_kg", H_LEFT, H_RIGHT, "left_arm.stiffness_N_per_m"]
@@ -280,12 +293,16 @@ HELD = "".join(f"{line},{'input_left_N,input_object_N,input_right_N' if line[0] 
     (re.sub(r"-0\.\d+", "0", ROWS), ("--scene", "case_01", "--free", P_LEFT), "positions do not change; allowed: a"),
     (ROWS, ("--scene", "arm_alone", "--free", "left_arm.mass_kg"), "x_object_m: arm_alone has no such body"),
     (HELD, ("--scene", "case_01", "--set", "loop={}", "--free", P_LEFT), "not the ticks of case_01, every 0.001 s"),
+    (HELD.replace("input_right_N", "impact_right_N"), ("--scene", "case_01", "--set", "loop={}", "--free", P_LEFT),
+     "no column input_right_N, the force that acted; allowed: one for each body that is driven, or neither forces nor"),
+    (HELD.replace("input", "command").replace("command_object_N", "V_J"),
+     ("--scene", "case_01", "--set", "loop={}", "--free", P_LEFT), "no column input_left_N, input_right_N, the force"),
     (ROWS.replace("-0.298,", "-2e200,"), ("--scene", "case_01", "--free", P_LEFT), "x_left_m: -2e+200 at t = 0.02 s"),
     (ROWS.replace(",", ";"), ("--scene", "case_01", "--free", P_LEFT), "one of x_left_m, v_left_m_per_s"),
     ("# mine\n" + ROWS, ("--scene", "case_01", "--free", P_LEFT), "line 1: # mine; allowed: t_s and at least one of"),
     (re.sub("0$", "0,ok", ROWS.replace("object_m", "object_m,why"), flags=re.MULTILINE),
      ("--scene", "case_01", "--free", P_LEFT), "column 'why': not known"),
-], ids=range(30))
+], ids=range(32))
 def test_refusals(tmp_path: Path, command: Any, content: str, words: tuple[str, ...], complaint: str) -> None:
     (tmp_path / "data.csv").write_text(content)
     result = command("fit", "data.csv", *words)

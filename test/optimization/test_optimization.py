@@ -76,6 +76,15 @@ def test_no_choice_along_two_outcomes_is_better_in_both(monkeypatch: pytest.Monk
     assert inputs == sorted(inputs, reverse=True)
 
 
+@pytest.mark.slow
+def test_a_bound_that_no_choice_keeps_costs_the_front_one_choice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the smallest forces are, the masses do not come to stay within the horizon."""
+    monkeypatch.setattr("grasp_ros.optimization.search.FRONT", 4)
+    scene = gr.load("case_01", ["time.duration_s=3"])
+    choices = front(DesignProblem(scene, [Axis(BOTH_KV, 0.5, 30.0)], ["last_outside", "peak_input"]))
+    assert [np.isfinite(own.outcomes["last_outside"]) for own in choices] == [True, True, False]
+
+
 @pytest.mark.parametrize(("free", "minimise", "bounds", "words"), [
     ({"left_arm.weight_kg": (1.0, 2.0)}, "settling_time", {}, "left_arm.weight_kg"),
     ({"left_arm.mass_kg": (-1.0, 2.0)}, "settling_time", {}, "-1.0 is not allowed"),

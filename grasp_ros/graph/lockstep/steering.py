@@ -93,12 +93,12 @@ class Steering:
 
     def _answer(self, response: Trigger.Response, why: str = "", **more: Any) -> Trigger.Response:
         """What the plant is now, as JSON; with what it will be, or why it is not."""
-        plant, state = self._plant, self._plant.phase.value
+        plant, state, words = self._plant, self._plant.phase.value, self._plant.words
         if plant.phase is Phase.RUNNING and self._paused:
-            state = STEPPING if self.steps else PAUSED
+            state = words = STEPPING if self.steps else PAUSED
         response.success = not why
         response.message = json.dumps({
-            "state": state, "words": plant.words, "tick": plant.tick, "ticks": plant.scene.ticks,
+            "state": state, "words": words, "tick": plant.tick, "ticks": plant.scene.ticks,
             "time_s": plant.scene.time_of(plant.tick), "steps": self.steps, "resets": plant.resets,
             "resetting": self.reset_due, "scene": plant.scene.name, **({"why": why} if why else {}), **more,
         })

@@ -107,7 +107,7 @@ class Remote(GraspNode):
 
     def step(self, number: str = "1") -> str:
         """Let a paused plant do some periods."""
-        wanted = _whole(number)
+        wanted = _whole("step", number)
         self._set("plant", "steps", wanted)
         found = self._status("step")
         if (asked := found.get("asked", wanted)) != wanted:
@@ -169,7 +169,7 @@ class Remote(GraspNode):
 
     def echo(self, topic: str, number: str = "") -> str:
         """Print messages of a topic as they come, a line each; so many, or until a signal."""
-        name, wanted = self.resolve_topic_name(topic), _whole(number) if number else None
+        name, wanted = self.resolve_topic_name(topic), _whole(f"echo {topic}", number) if number else None
         self._wait(lambda: bool(self.count_publishers(name)), f"nobody publishes {name}")
         [kind, *_] = dict(self.get_topic_names_and_types())[name]
         if kind not in messages.TYPES:
@@ -213,9 +213,9 @@ class Remote(GraspNode):
                 raise Failed(otherwise)
 
 
-def _whole(word: str) -> int:
+def _whole(what: str, word: str) -> int:
     if not word.isdecimal() or len(word) > MOST_DIGITS or not int(word):
-        raise Refused(f"{word}: not allowed; allowed: a whole number >= 1")
+        raise Refused(f"{what} {word}: not allowed; allowed: a whole number >= 1")
     return int(word)
 
 
