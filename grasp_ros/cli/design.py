@@ -74,15 +74,16 @@ def _table(problem: Any, found: Sequence[Any]) -> list[str]:
     """A column for each free number and outcome, a row for each choice; of one choice a line for each of them."""
     from grasp_ros.cli.report import table
 
-    units = problem.units
+    units = {name: "" if unit == "1" else f" {unit}" for name, unit in problem.units.items()}
     if len(found) == 1:
         numbers = found[0].numbers
         ends = {key for axis in problem.axes for key in axis.keys if _is_end(axis, numbers[key])}
         rows = [*((key, f"{value:.10g}{END if key in ends else ''}") for key, value in numbers.items()),
-                *((name, f"{value:.10g} {units[name]}") for name, value in found[0].outcomes.items()),
+                *((name, f"{value:.10g}{units[name]}") for name, value in found[0].outcomes.items()),
                 ("simulations", str(found[0].runs))]
         return [table(rows)]
-    heads = [*(f"{name}, {unit}" for name, unit in units.items()), *(axis.name for axis in problem.axes)]
+    heads = [*(f"{name},{unit}" if unit else name for name, unit in units.items()),
+             *(axis.name for axis in problem.axes)]
     lines = [[*(f"{own.outcomes[name]:.6g}" for name in units),
               *(f"{own.numbers[axis.keys[0]]:.8g}" for axis in problem.axes)] for own in found]
     widths = [max(map(len, column)) for column in zip(heads, *lines, strict=True)]

@@ -152,7 +152,13 @@ class Keys:
             if self._file >= 0 and os.tcgetpgrp(self._file) == os.getpgrp():
                 self._before = termios.tcgetattr(self._file)
                 self.there = True
-                tty.setcbreak(self._file)
+                self._take()
+
+    def _take(self) -> None:
+        """Set the terminal, again after a Ctrl-Z: the shell has put it back."""
+        with suppress(OSError, termios.error):  # it is gone
+            if self.there and os.tcgetpgrp(self._file) == os.getpgrp():
+                tty.setcbreak(self._file, termios.TCSANOW)
 
     def close(self) -> None:
         """Give the terminal back; does nothing the second time."""
@@ -162,6 +168,7 @@ class Keys:
 
     def pressed(self, seconds: float = 0.0) -> list[Key]:
         """Keys in their order; waits for the first one, at most so many seconds. A terminal that is gone is a QUIT."""
+        self._take()
         ready, _, _ = select.select([self._file] if self.there else [], [], [], seconds)
         if not ready:
             return []

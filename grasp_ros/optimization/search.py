@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -255,6 +256,8 @@ def front(problem: DesignProblem, seed: int = 0, progress: Told | None = None) -
         return choices[-1]
 
     most, least = add(first, problem.bounds).outcomes[second], add(second, problem.bounds).outcomes[second]
+    if not math.isfinite(most):  # the best choice of those that have the second outcome
+        most = add(first, (*problem.bounds, Bound(second, sys.float_info.max))).outcomes[second]
     for level in np.linspace(most, least, FRONT)[1:]:
         with suppress(Refused):
             add(first, (*problem.bounds, Bound(second, max(float(level), least))))

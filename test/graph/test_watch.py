@@ -95,6 +95,10 @@ class Screen:
         """Whether the terminal is as it was at first."""
         return termios.tcgetattr(self._theirs) == self._before
 
+    def put_back(self) -> None:
+        """Make the terminal as it was at first, as a shell does when a Ctrl-Z has stopped the process."""
+        termios.tcsetattr(self._theirs, termios.TCSANOW, self._before)
+
     def end(self) -> int:
         """Exit status of the process."""
         def status() -> list[str]:
@@ -126,6 +130,7 @@ def test_keys_pause_step_and_end_a_bag(launch: Any, path: Path) -> None:
         screen.press(key)
         picture = screen.wait(rf"t = {at + 0.001 * ticks:.3f} s   paused")
         assert f"{recording.state[round(1000 * at) + ticks, 0]:+.5f}" in picture
+    screen.put_back()
     screen.press(b" ")
     screen.wait("0.05 s per second")
     screen.press(b"q")
