@@ -63,7 +63,7 @@ def _fit(options: argparse.Namespace) -> int:
         from grasp_ros.identification.figure import measured_and_fitted
 
         write_figure(measured_and_fitted(found), options.output)
-    return 1 if found.not_identifiable else 0
+    return 1 if found.not_identifiable or found.missed else 0
 
 
 def _data(found: Fit) -> dict[str, Any]:
@@ -75,5 +75,6 @@ def _data(found: Fit) -> dict[str, Any]:
         "not_identifiable": found.not_identifiable, "covariance": found.covariance, "correlation": found.correlation,
         "noise": dict(zip(CHANNELS, found.noise, strict=True)),
         "contacts": [contact._asdict() for contact in found.contacts],
+        "missed": found.missed,
         "against": {key: {**test._asdict(), "rejected": test.rejected} for key, test in found.against.items()},
     }

@@ -7,10 +7,10 @@ from types import MappingProxyType
 
 import numpy as np
 
-from grasp_ros.identification.measured import FEWEST, Source, measured
+from grasp_ros.identification.measured import FEWEST, INITIAL, Measured, Source, measured
 from grasp_ros.identification.numbers import OFFSET, acts, numbers_of
 from grasp_ros.identification.result import CONFIDENCE, Against, Fit, identifiability_of, residual_table
-from grasp_ros.identification.search import FitProblem, first_noise, fitted, mean_square, refine, search
+from grasp_ros.identification.search import FitProblem, first_noise, fitted, mean_square, missed, refine, search
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import mapping, names, number, truth
 from grasp_ros.physics.model import Array
@@ -39,7 +39,8 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
         "section.key" of numbers that enter smoothly: masses, stiffness, damping, H, p, gains, initial values.
         "offset.x_left_m" is the offset of a sensor: measured minus true value.
     scene : Scene, optional
-        What is known, and the start of what is free. Default: the scene of the data; a .csv file has none.
+        What is known, and the start of what is free; initial values that the data have at t = 0 start there. Default:
+        the scene of the data; a .csv file has none.
     against : mapping of str to float
         Free numbers whose value is tested: whether the data reject it.
     by_sensors : bool
@@ -56,7 +57,7 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
         check_scene(scene)
     free, found = names("free", free), measured(data, scene, truth("by_sensors", by_sensors))
     against = {key: number(f"against: {key}", value) for key, value in mapping("against", against).items()}
-    numbers = numbers_of(found.scene, free, found)
+    numbers = numbers_of(_begun(found, free), free, found)
     if any(acts(number.key) for number in numbers):
         found = found._replace(inputs=None)
     if found.inputs is None and found.why_unknown:
@@ -73,6 +74,12 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
     return _result(fitted(FitProblem(found, numbers, first_noise(found))), against)
 
 
+def _begun(data: Measured, free: Sequence[str]) -> Scene:
+    """The scene of the data, with those of the free initial values that were measured."""
+    seen = {key: float(data.state[0, place]) for place, key in enumerate(INITIAL) if place in data.channels}
+    return data.scene.changed({key: seen[key] for key in free if key in seen} if data.t[0] == 0.0 else {})
+
+
 def _result(problem: FitProblem, against: Mapping[str, float]) -> Fit:
     """What the minimum, at y = 0, says."""
     data, rows, y = problem.data, len(problem.data.t), np.zeros(len(problem.numbers))
@@ -81,6 +88,9 @@ def _result(problem: FitProblem, against: Mapping[str, float]) -> Fit:
     states[:, [place for place in range(6) if place not in data.channels]] = np.nan
     covariance, reach, unseen = identifiability_of(slopes, values, len(y))
     below, above = _reaches(problem, reach, covariance, values)
+    lost = np.isinf(below) & np.isinf(above)
+    covariance[lost], covariance[:, lost] = np.nan, np.nan
+    unseen += [[place] for place in np.flatnonzero(lost).tolist() if not any(place in places for places in unseen)]
     estimates = problem.values(y)
     found = np.array([*estimates.values()])
     scale, least = np.array([(number.width, number.least) for number in problem.numbers]).T
@@ -89,7 +99,7 @@ def _result(problem: FitProblem, against: Mapping[str, float]) -> Fit:
         np.maximum(found - scale * below, least), found + scale * above, covariance * np.outer(scale, scale),
         tuple(tuple(problem.numbers[place].key for place in places) for places in unseen),
         data.t, data.state, states, np.where(np.isin(range(6), data.channels), problem.noise, np.nan),
-        residual_table(values.reshape(rows, -1), data.t, touches),
+        residual_table(values.reshape(rows, -1), data.t, touches), missed(data, problem.noise),
         {key: _test(problem, key, value, values) for key, value in against.items()},
     )
 

@@ -30,6 +30,8 @@ from grasp_ros.simulation.trajectory_file import load
 
 CHANNELS = tuple(HEADS[column.name] for column in COLUMNS[:6])  # names of the states, in their order
 INPUTS = tuple(HEADS[f"input_{NAMES[body]}"] for body in sorted(BODIES))  # by body
+INITIAL = tuple(f"{section}.{key}" for section in ("left_arm", "object", "right_arm")
+                for key in ("position_m", "velocity_m_per_s"))  # their values at t = 0, by "section.key"
 COMMANDS = tuple(HEADS[f"command_{name}"] for name in SIDES)
 T = HEADS[TIME.name]
 ROUNDED = 1e-6  # of a control period, by which times of a table may differ from the ticks

@@ -74,6 +74,8 @@ class Fit(Frozen):
         Standard deviation of each channel, as its residuals have it.
     contacts : tuple of Residuals
         From each touch of the fitted motion to the next.
+    missed : tuple of str
+        Channels in which the fitted motion is not the measured one: the search ended elsewhere, or the scene is wrong.
     against : mapping of str to Against
         Tests of values.
     """
@@ -92,6 +94,7 @@ class Fit(Frozen):
     fitted: Array
     noise: Array
     contacts: tuple[Residuals, ...]
+    missed: tuple[str, ...]
     against: Mapping[str, Against]
 
     @property
@@ -187,8 +190,12 @@ def _lines(found: Fit) -> Iterator[str]:
     for contact in found.contacts:
         begin = "begin" if contact.side == "none" else f"{contact.side} touch, {contact.begin:.4f} s"
         yield f"  {begin:<24}{contact.samples:>6}{contact.rms:>8.3f}{_cell(contact.white, 10, 3)}"
-    if any(contact.white < UNLIKELY for contact in found.contacts):
-        yield "the residuals are not noise: the scene lacks something that acted, and the intervals are too narrow"
+    if found.missed:
+        yield (f"the fitted motion is not the measured one in {', '.join(found.missed)}: the search ended elsewhere, or"
+               " the scene is wrong; try other starts")
+    elif any(contact.white < UNLIKELY for contact in found.contacts):
+        yield ("the residuals are not noise: the scene lacks something that acted, or the data are rounded; the"
+               " intervals are too narrow")
     for key, test in found.against.items():
         verdict = "rejected" if test.rejected else "not rejected"
         yield f"{key} = {test.value:g}: {verdict}, F = {test.F:.4g}, probability {test.probability:.2g}"

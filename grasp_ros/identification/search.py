@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.identification.measured import FEWEST, Measured
+from grasp_ros.identification.measured import CHANNELS, FEWEST, Measured
 from grasp_ros.identification.numbers import Number, acts
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import Entry, Transition
@@ -32,6 +32,7 @@ from grasp_ros.simulation.ticks import tick_of
 GROWTHS = (2.0, math.sqrt(2.0))  # of the horizon; the second where the first does not lead to a fit
 FIRST = 16.0  # part of the motion that is the first horizon
 GOOD = 4.0  # mean square of residuals, in those of the noise, above which a search has not found the motion
+FAR, PART = 10.0, 0.2  # of the scatter, and of the motion: residuals above both tell of another motion
 ROUGH, FINE = 1e-3, 1e-6  # relative change of the sum of squares at which a search ends, on the way and at last
 SHORTEST = 1e-10  # step of y, relative
 MOST = 30  # motions of one horizon
@@ -167,6 +168,16 @@ def _at_least(noise: Array, data: Measured) -> Array:
     spread = np.ptp(data.state, axis=0)
     others = np.tile(np.fmax.reduce(spread.reshape(3, 2)), 3)
     return np.asarray(np.maximum(noise, FLOOR * np.where(spread == 0.0, others, spread)))
+
+
+def missed(data: Measured, noise: Array) -> tuple[str, ...]:
+    """Channels whose residuals, of a size (6,), are far above the scatter of samples, and a part of the motion itself.
+
+    It is the largest motion of a channel of the kind, position or velocity, because that of one may be little.
+    """
+    spread = np.tile(np.fmax.reduce(np.std(data.state, axis=0).reshape(3, 2)), 3)
+    far = (noise > FAR * first_noise(data)) & (noise > PART * spread)
+    return tuple(CHANNELS[place] for place in data.channels if far[place])
 
 
 def fitted(problem: FitProblem) -> FitProblem:

@@ -15,6 +15,7 @@ from collections.abc import Callable, Generator, Iterable
 from contextlib import closing, nullcontext
 from functools import cache
 from itertools import islice
+from multiprocessing.resource_tracker import ensure_running
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +92,7 @@ def connect(workers: int, scheduler: str) -> Any:
     with needing("a cluster", "cluster"):
         from distributed import Client
     if not scheduler:
+        ensure_running()  # by itself it would start later, and let a Ctrl-C through to the workers
         before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])  # a Ctrl-C is for us: workers end with us
         try:
             options = {"dashboard_address": None, "silence_logs": logging.CRITICAL}  # workers that end are no error

@@ -148,7 +148,8 @@ def test_a_sensor_that_stands_still_beside_others_is_no_fault(tmp_path: Path, co
     """As a spreadsheet writes it, with the mark of its encoding."""
     (tmp_path / "data.csv").write_text(ROWS, encoding="utf-8-sig")
     result = command("fit", "data.csv", "--scene", "case_01", "--free", "object.position_m")
-    assert (result.returncode, result.stderr) == (0, "")
+    assert (result.returncode, result.stderr) == (1, "")  # it is another motion
+    assert "the fitted motion is not the measured one in x_left_m" in result.stdout
 
 
 @pytest.mark.parametrize("loop", [(), ("loop={}",)])
@@ -173,6 +174,23 @@ def test_times_may_be_a_rounding_off_the_ticks_and_a_body_without_a_force_needs_
     assert found.t.tobytes() == same.t.tobytes()
     assert found.inputs is not None
     assert found.inputs.tolist() == same.inputs.tolist()  # type: ignore[union-attr]
+
+
+def test_an_initial_value_that_was_measured_starts_there() -> None:
+    """From -0.2 the search ended at -0.03, with a narrow interval."""
+    scene, key = load("case_01", ["time.duration_s=2"]), "right_arm.position_m"
+    found = fit(noisy(simulate(scene), 7), [key], scene.changed({key: -0.2}))
+    assert found.low[0] < 0.5 < found.high[0]
+    assert found.missed == ()
+
+
+def test_a_search_that_ends_at_another_motion_says_so(tmp_path: Path, command: Any) -> None:
+    path, stiffness = tmp_path / "run.csv", "left_arm.stiffness_N_per_m"
+    noisy(simulate(load("case_01", ["time.duration_s=2"])), 7).to_csv(path)
+    words = "fit", str(path), "--scene", "case_01", "--free", H_LEFT, stiffness, "--set", f"{stiffness}=10000"
+    result, data = command(*words), json.loads(command(*words, "--json").stdout)
+    assert (result.returncode, "x_left_m" in data["missed"]) == (1, True)
+    assert "the fitted motion is not the measured one in x_left_m" in result.stdout
 
 
 def test_masses_are_free_only_up_to_a_scale_without_a_known_force() -> None:
