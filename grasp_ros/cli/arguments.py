@@ -62,7 +62,8 @@ def add_accuracy(sub: Options) -> None:
     """The accuracy of `exact`."""
     sub.add_argument(
         "--accuracy", type=float, default=ACCURACY, metavar="A",
-        help=f"first neglected term of a contact, relative, {FINEST:g} to {COARSEST:g} (default {ACCURACY:g})",
+        help=f"size of the first neglected Taylor term of a contact, relative to the impact, {FINEST:g} to {COARSEST:g}"
+        f" (default {ACCURACY:g})",
     )
 
 

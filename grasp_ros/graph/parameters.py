@@ -30,6 +30,7 @@ PLANT: Settings = {
     "scene": ("case_01", "name of a scene of the package, or path of a .yaml file"),
     "accuracy": (ACCURACY, "relative size of the first neglected term of a contact"), **MONITORED,
     "paused": (False, "begin paused, at the first state"),
+    "steps": (1, "control periods of one call of the service step"),
     "progress": (False, "show a progress bar on a terminal"),
     "free_running": (False, "follow the wall clock instead of waiting for the commands"), **FREE, **PEERS,
 }

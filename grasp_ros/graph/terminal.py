@@ -125,7 +125,8 @@ class View:
             table.add_row(name, f"{value:.6g} J", Text("█" * filled, style="green" if closed else "yellow"))
         table.add_row("contact", CONTACT.get(level["mode"], UNKNOWN), "")
         table.add_row("balance", BALANCE.get(level["alarm"], UNKNOWN), "")
-        return [table] if closed else [table, "V: law unknown, or not the announced one"]
+        return [table] if closed else [
+            table, "V: law unknown" if width < NARROW else "V: law unknown, or not the announced one"]
 
 
 class Key(Enum):

@@ -19,6 +19,7 @@ from grasp_ros.exact.automaton.edge import (
     difference,
     glides,
     has_glided,
+    is_negligible,
     other_push,
     parting_time,
     separates,
@@ -248,6 +249,26 @@ def test_a_force_that_begins_at_the_surface_by_the_third_derivative_adds_to_the_
     b.plant.bodies[far, Of.STIFFNESS] = 0.8
     b.plant.bodies[far, Of.FORCE] += 0.8 * b.state.y[lane]
     assert deciding_derivative(b.plant, b.state, side) == pytest.approx((4.0, expected))
+
+
+@SIDES
+@pytest.mark.parametrize(("mode", "expected"), [(Pair.CLAMPED, (4.0, -2.0)), (Pair.BEGINNING, (3.5, math.inf))])
+def test_a_pair_that_is_closed_without_a_force(side: Body, mode: Pair, expected: tuple[float, float]) -> None:
+    """It has none at all, or is going to have one soon; the fourth derivative is the first of this pair's own."""
+    b = bench(side, 0.0, 0.0, beside=(0.01, 0.3), beside_mode=mode, push=1.0, object_push=1.0, beside_push=1.0,
+              stiffness=2.0)
+    assert deciding_derivative(b.plant, b.state, side) == pytest.approx(expected)
+
+
+@SIDES
+@pytest.mark.parametrize(("u", "stuck", "negligible"), [(1e-10, False, True), (1e-10, True, False), (1e-14, True, True),
+                                                        (1e-6, False, False)])
+def test_a_stuck_object_takes_a_smaller_force_for_one(side: Body, u: float, stuck: bool, negligible: bool) -> None:
+    """Of 1 kg at 1 m/s the impulses 1e-21, 1e-31 and 1e-11 N s; 1 N of friction holds against 1e-11 and 1e-17 N."""
+    b = bench(side, u, 1.0, p=0.0, coulomb=1.0)
+    if stuck:
+        b.plant.bodies[OBJECT, Of.MASS] = math.inf
+    assert is_negligible(b.plant, side, u, 1.0, EPS) is negligible
 
 
 # How long the sign is certain.

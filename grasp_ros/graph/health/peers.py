@@ -181,7 +181,7 @@ class PeerNode(GraspNode):
             self._silent.clear()
             if self._left is None:
                 self._left = self.phase, self.words
-                self.phase, self.words = Phase.IDLE, f"waiting for another one: {trouble.words}"
+                self.phase, self.words = Phase.IDLE, f"{trouble.words}; waiting for another one"
                 self.get_logger().info(self.words)
         elif (gone and need.gone is Gone.ENDS) or (self._ends and trouble.certain):
             self.fail(trouble.words)

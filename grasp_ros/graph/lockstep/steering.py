@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 from std_srvs.srv import Trigger
 
+from grasp_ros.graph.parameters import PARAMETERS
 from grasp_ros.graph.ros.node import Phase
 
 if TYPE_CHECKING:  # it imports this one
@@ -31,8 +32,9 @@ class Steering:
         self._paused = plant.read_only("paused")
         self.steps = 0  # control periods that are still to be done although the plant is paused
         self.reset_due = False  # whether it is to be put back once its current state has been answered
-        plant.declare("steps", 1, ParameterDescriptor(
-            description="control periods of one call of the service step",
+        default, text = PARAMETERS["plant"]["steps"]
+        plant.declare("steps", default, ParameterDescriptor(
+            description=text,
             integer_range=[IntegerRange(from_value=1, to_value=MOST_STEPS, step=1)],
         ))
         for name, action in (("pause", partial(self._pause, True)), ("resume", partial(self._pause, False)),
