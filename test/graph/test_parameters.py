@@ -176,7 +176,7 @@ def test_an_announcement_that_is_lost_is_seen_in_the_bag(tmp_path: Path) -> None
 def test_help_names_what_can_be_set(loop: tuple[Any, ...]) -> None:
     """It starts no node."""
     plant, controller, _ = loop
-    ros = ("use_sim_time", "start_type_description_service", "qos_overrides", "steps")
+    ros = ("use_sim_time", "start_type_description_service", "qos_overrides")
     for name, node, later in (("plant", plant, {*FREE}), ("left_controller", controller, set())):
         declared = {key for key in node._parameters if not key.startswith(ros) and "." not in key}
         assert declared | later == {*NODES[name]}
