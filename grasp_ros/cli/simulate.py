@@ -19,7 +19,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import GRID_POINTS, simulate
-from grasp_ros.simulation.ticks import tick_times
+from grasp_ros.simulation.sampled_plant import tick_times
 
 
 def add_to(commands: Any) -> None:

@@ -23,8 +23,8 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.files import decoding, reading
 from grasp_ros.scene.suggestion import allowed
+from grasp_ros.simulation.sampled_plant import tick_times
 from grasp_ros.simulation.tables import COLUMNS, HEADS, TIME
-from grasp_ros.simulation.ticks import tick_times
 from grasp_ros.simulation.trajectory import Trajectory
 from grasp_ros.simulation.trajectory_file import load
 

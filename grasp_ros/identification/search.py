@@ -26,8 +26,7 @@ from grasp_ros.scene import Scene, compose
 from grasp_ros.sensitivity.directions import directions
 from grasp_ros.sensitivity.run import Carrier
 from grasp_ros.simulation.differentiate import complete
-from grasp_ros.simulation.sampled_plant import SampledPlant
-from grasp_ros.simulation.ticks import tick_of
+from grasp_ros.simulation.sampled_plant import SampledPlant, tick_of
 
 GROWTHS = (2.0, math.sqrt(2.0))  # of the horizon; the second where the first does not lead to a fit
 FIRST = 16.0  # part of the motion that is the first horizon

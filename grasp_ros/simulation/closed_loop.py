@@ -28,8 +28,7 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.own_law import begin
-from grasp_ros.simulation.sampled_plant import Outputs, SampledPlant
-from grasp_ros.simulation.ticks import LoopRecord, new_loop
+from grasp_ros.simulation.sampled_plant import LoopRecord, Outputs, SampledPlant, new_loop
 
 Progress = Callable[[float], object] | None
 PATIENCE = 0.1  # s that a block of ticks may take

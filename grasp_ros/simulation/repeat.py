@@ -20,8 +20,7 @@ from grasp_ros.physics.layout import OBJECT, Entry
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.simulation.closed_loop import outputs_within, solve
-from grasp_ros.simulation.sampled_plant import SampledPlant
-from grasp_ros.simulation.ticks import LoopRecord, tick_of, tick_times
+from grasp_ros.simulation.sampled_plant import LoopRecord, SampledPlant, tick_of, tick_times
 
 if TYPE_CHECKING:  # it imports this file
     from grasp_ros.simulation.trajectory import Trajectory

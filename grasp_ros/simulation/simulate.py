@@ -22,7 +22,7 @@ from grasp_ros.scene.places import check_scene
 from grasp_ros.sensitivity.directions import check_keys
 from grasp_ros.simulation.closed_loop import NO_CHANGES, Changes, Progress, check_changes, solve, wrap_controllers
 from grasp_ros.simulation.progress import showing
-from grasp_ros.simulation.ticks import tick_times
+from grasp_ros.simulation.sampled_plant import tick_times
 from grasp_ros.simulation.trajectory import Trajectory
 
 GRID_POINTS = 2001

@@ -28,9 +28,9 @@ from grasp_ros.scene.files import opened
 from grasp_ros.scene.npz import signed
 from grasp_ros.simulation.contacts import check_located, contact_table, side_of
 from grasp_ros.simulation.repeat import breaks_of, states_at
+from grasp_ros.simulation.sampled_plant import LoopRecord, tick_of
 from grasp_ros.simulation.sections import Function, Section, as_function, crossings
 from grasp_ros.simulation.tables import Tabular
-from grasp_ros.simulation.ticks import LoopRecord, tick_of
 
 if TYPE_CHECKING:
     from grasp_ros.simulation.differentiate import Sensitivity
