@@ -65,7 +65,7 @@ def _methods(options: argparse.Namespace) -> int:
 
 def _simulate(options: argparse.Namespace) -> int:
     from grasp_ros.cli.report import describe_sensitivity, describe_trajectory, last_rates, table
-    from grasp_ros.simulation.summary import summary
+    from grasp_ros.simulation.quantities import summary
 
     scene = load_scene(options.scene, options.settings)
     here = os.open(".", os.O_RDONLY)
