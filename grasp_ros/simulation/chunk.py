@@ -35,7 +35,6 @@ SETTLED = 0.02  # of the largest initial displacement
 HORIZONS = 120  # for which a run goes on at most, until V_c decides whether it has settled
 REFUSED = "REFUSED"
 STATUSES = (Status.DONE.name, REFUSED, *(status.name for status in Status if status is not Status.DONE))
-NO_GRID = np.zeros(0)
 NEVER = np.zeros(1, dtype=np.int64)
 Drive = Callable[[Scene, Integrator, bool, Array], Array]  # see `closed_loop.drive`
 LEFT_OUT = -2  # in place of why a row ended
@@ -91,7 +90,7 @@ def check(scene: Scene, setup: Setup | None, outcomes: Sequence[str] | None = No
     columns = find(setup.outcomes)
     if not 0.0 < setup.settled < 1.0:
         raise Refused(f"settled: {setup.settled!r} is not allowed; allowed: a number > 0 and < 1")
-    if has_inputs(scene, setup) and any(column.name == LYAPUNOV for column in columns):
+    if has_inputs(scene, setup) and LYAPUNOV in setup.outcomes:
         raise Refused(f"{scene.name}: outcome lyapunov: allowed: continuous feedback, no external force")
     return setup, columns
 
@@ -99,18 +98,19 @@ def check(scene: Scene, setup: Setup | None, outcomes: Sequence[str] | None = No
 def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER, move: Drive = drive) -> Chunk:
     """Run some rows, one after the other; a `stop` that is not 0 ends it early, with rows left out."""
     columns, n = find(setup.outcomes), variants.rows
+    wanted = wanted_by(columns)
     runs = Runs(np.full((n, SEEN), np.nan), np.full((n, 6), np.nan), np.zeros((n, 2)), np.full(n, np.nan))
     status, stops = np.zeros(n, dtype=np.int8), variants.faults()
     for i in stops:
         status[i] = STATUSES.index(REFUSED)
     left = np.flatnonzero(status == 0)
     plain = COMPILED and variants.is_plain and not has_inputs(variants.scene, setup)  # rows need no interpreter
-    if plain and move is drive and all(column.name != LYAPUNOV for column in columns):
-        left = _run_plain(variants, setup, wanted_by(columns), runs, left, stop)
+    if plain and move is drive and LYAPUNOV not in setup.outcomes:
+        left = _run_plain(variants, setup, wanted, runs, left, stop)
     for i in left.tolist():
         if stop[0]:
             break
-        ended, stopped = _run(variants.row(i), setup, columns, runs, i, move)
+        ended, stopped = _run(variants.row(i), setup, wanted, runs, i, move)
         if ended is not Status.DONE:
             status[i], stops[i] = STATUSES.index(ended.name), stopped
     system = variants.scene.system
@@ -145,19 +145,17 @@ def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, whi
     return np.asarray(which[~done])
 
 
-def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome], runs: Runs, i: int, move: Drive
-         ) -> tuple[Status, str]:
+def _run(scene: Scene, setup: Setup, wanted: Wanted, runs: Runs, i: int, move: Drive) -> tuple[Status, str]:
     """One row, driven as `simulate` drives it, or by other commands; how it ended at its horizon, and why."""
     system, sampled = scene.system, setup.sampled or scene.sampled
     run = Integrator(
         system, continuous=not sampled, accuracy=setup.accuracy, max_events=setup.max_events, max_work=setup.max_work)
-    wanted = wanted_by(columns)
     run_observer = watch(run, wanted, setup.settled) if wanted else None
-    move(scene, run, sampled, NO_GRID)
+    move(scene, run, sampled, np.zeros(0))
     touched = run.event_table[run.event_table[:, Entry.KIND] == Transition.TOUCH, Entry.BODY]
     runs.state[i], runs.touches[i] = run.state, [(touched == side).sum() for side in (LEFT, RIGHT)]
     ended, done = (run.status, run.stop), run.status is Status.DONE
-    if done and any(column.name == LYAPUNOV for column in columns):
+    if done and LYAPUNOV in setup.outcomes:
         from grasp_ros.sensitivity.spectrum import spectrum  # whose kernels no other run loads
 
         with suppress(Refused):  # a run in pieces of time may stop where this one did not

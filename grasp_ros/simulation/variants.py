@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from grasp_ros.physics import given
 from grasp_ros.physics.control import Column
@@ -36,15 +36,14 @@ class Block:
     laws: Array  # (n, 2, k), see `physics.control.Column`
 
     @property
+    @np.errstate(all="ignore")  # a row that is refused may hold any number
     def closed_loop(self) -> Array:
         """`bodies` with the continuous feedback in them, as `System.closed_loop` has it."""
         bodies = self.bodies.copy()
         gains, offset = self.laws[..., : Column.SET_POINT], self.laws[..., Column.SET_POINT]
         bodies[:, : OBJECT, Of.STIFFNESS] += gains[..., Column.POSITION_GAIN]
         bodies[:, : OBJECT, Of.DAMPING] += gains[..., Column.VELOCITY_GAIN]
-        with np.errstate(all="ignore"):  # a row that is refused may hold any number
-            held = gains[..., Column.POSITION_GAIN] * offset
-        bodies[:, : OBJECT, Of.FORCE] += held + self.laws[..., Column.FEED_FORWARD]
+        bodies[:, : OBJECT, Of.FORCE] += gains[..., Column.POSITION_GAIN] * offset + self.laws[..., Column.FEED_FORWARD]
         return bodies
 
 
@@ -79,25 +78,22 @@ class Variants:
 
     def faults(self) -> dict[int, str]:
         """Sentences for the rows that the scene's rules refuse."""
-        uncertain = self._uncertain() if self.is_plain else np.arange(self.rows)
+        uncertain = np.full(self.rows, not self.is_plain)
+        if self.is_plain:  # outside a range, with a negative sum of an arm's own number and its feedback's, or outside
+            for name, column in self.changes.items():
+                uncertain |= ~self._parameters[name].holds(column)
+            block = self.block()
+            uncertain |= (block.closed_loop[:, : OBJECT, Of.STIFFNESS : Of.FORCE] < 0.0).any(axis=(1, 2))
+            with np.errstate(all="ignore"):  # an uncertain row may hold any number
+                rows = Systems(block.closed_loop, block.pairs, block.state[..., 0], self.scene.duration)
+                uncertain |= outside_rows(rows)
         found = {}
-        for i in uncertain.tolist():
+        for i in np.flatnonzero(uncertain).tolist():
             try:
                 self.row(i)
             except SceneError as error:
                 found[i] = str(error)
         return found
-
-    def _uncertain(self) -> NDArray[np.int64]:
-        """Rows with a number outside its range, with a negative sum of an arm's own and its feedback's, or outside."""
-        uncertain = np.zeros(self.rows, dtype=bool)
-        for name, column in self.changes.items():
-            uncertain |= ~self._parameters[name].holds(column)
-        block = self.block()
-        uncertain |= (block.closed_loop[:, : OBJECT, Of.STIFFNESS : Of.FORCE] < 0.0).any(axis=(1, 2))
-        with np.errstate(all="ignore"):  # an uncertain row may hold any number
-            uncertain |= outside_rows(Systems(block.closed_loop, block.pairs, block.state[..., 0], self.scene.duration))
-        return np.flatnonzero(uncertain)
 
     def block(self) -> Block:
         """The rows as arrays; to be called only if `is_plain`."""
