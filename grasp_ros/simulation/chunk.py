@@ -131,7 +131,7 @@ def has_inputs(scene: Scene, setup: Setup) -> bool:
 def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, which: NDArray[np.int64],
                stop: NDArray[np.int64]) -> NDArray[np.int64]:
     """Integrate rows in one call; returns those that are left to `_run`, because they do not just reach the end."""
-    block, n = variants.block(), len(which)
+    block, n = variants.block, len(which)
     loop, own, gains, pairs, coulomb, state = map(np.ascontiguousarray, (
         block.closed_loop[which], block.bodies[which], block.laws[which][..., : Column.SET_POINT], block.pairs[which],
         block.coulomb[which, 0, 0], block.state[which, :, 0]))

@@ -8,7 +8,6 @@ so that the rules and the sentences are those of `scene.validation` alone.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -35,7 +34,7 @@ class Block:
     coulomb: Array  # (n, 1, 1)
     laws: Array  # (n, 2, k), see `physics.control.Column`
 
-    @property
+    @cached_property
     @np.errstate(all="ignore")  # a row that is refused may hold any number
     def closed_loop(self) -> Array:
         """`bodies` with the continuous feedback in them, as `System.closed_loop` has it."""
@@ -62,10 +61,7 @@ class Variants:
 
     def part(self, first: int, last: int) -> Variants:
         """Rows from the first to before the last one."""
-        part = copy(self)
-        part.changes = {name: column[first:last] for name, column in self.changes.items()}
-        part.rows = last - first
-        return part
+        return Variants(self.scene, {name: column[first:last] for name, column in self.changes.items()})
 
     def row(self, i: int) -> Scene:
         """One row as a scene."""
@@ -82,7 +78,7 @@ class Variants:
         if self.is_plain:  # outside a range, with a negative sum of an arm's own number and its feedback's, or outside
             for name, column in self.changes.items():
                 uncertain |= ~self._parameters[name].holds(column)
-            block = self.block()
+            block = self.block
             uncertain |= (block.closed_loop[:, : OBJECT, Of.STIFFNESS : Of.FORCE] < 0.0).any(axis=(1, 2))
             with np.errstate(all="ignore"):  # an uncertain row may hold any number
                 rows = Systems(block.closed_loop, block.pairs, block.state[..., 0], self.scene.duration)
@@ -95,8 +91,9 @@ class Variants:
                 found[i] = str(error)
         return found
 
+    @cached_property
     def block(self) -> Block:
-        """The rows as arrays; to be called only if `is_plain`."""
+        """The rows as arrays, where `is_plain`."""
         system, n = self.scene.system, self.rows
         block = Block(*(np.repeat(array[None], n, axis=0) for array in (
             system.bodies, system.pairs, system.state[:, None], np.full((1, 1), system.coulomb), system.law_rows,

@@ -108,7 +108,7 @@ def test_arrays_are_built_and_refused_like_scenes() -> None:
     for name, values in named.items():
         variants = Variants(scene, {name: values})
         assert variants.is_plain
-        block, faults = variants.block(), variants.faults()
+        block, faults = variants.block, variants.faults()
         for i in range(variants.rows):
             if i in faults:
                 with pytest.raises(SceneError) as refusal:
