@@ -16,8 +16,7 @@ from grasp_ros.physics.given import number, read_number, text, truth, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.places import parameter_of
-from grasp_ros.simulation.chunk import Setup, check
-from grasp_ros.simulation.variants import Variants
+from grasp_ros.simulation.chunk import Setup, Variants, check
 
 POINTS, MOST, MOST_AXES, DIGITS = 101, 10**9, 2, 15
 

@@ -20,11 +20,10 @@ from grasp_ros.physics.layout import OBJECT, Entry
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.simulation.chunk import HORIZONS, SETTLED, Setup, compute
+from grasp_ros.simulation.chunk import HORIZONS, SETTLED, Setup, Variants, compute
 from grasp_ros.simulation.closed_loop import drive, outputs_within, solve
 from grasp_ros.simulation.outcomes import GROUPS
 from grasp_ros.simulation.sampled_plant import LoopRecord, SampledPlant, tick_of, tick_times
-from grasp_ros.simulation.variants import Variants
 
 if TYPE_CHECKING:  # it imports this file
     from grasp_ros.simulation.trajectory import Trajectory
