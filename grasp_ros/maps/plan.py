@@ -148,7 +148,6 @@ class Plan:
     @staticmethod
     def from_document(document: dict[str, Any]) -> Plan:
         """The plan of a document."""
-        setup = Setup(**{**document["setup"], "outcomes": tuple(document["setup"]["outcomes"])})
         scene = scenes.parse(document["scene"], document["scene_name"], document["scene_name"])
         axes = tuple(Axis(**axis) for axis in document["axes"])
-        return Plan(scene, setup, axes, document["sample"], document["seed"])
+        return Plan(scene, Setup(**document["setup"]), axes, document["sample"], document["seed"])
