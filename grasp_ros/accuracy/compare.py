@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from operator import attrgetter
 from typing import NamedTuple
 
-from grasp_ros.accuracy.measure import NOT_INSTALLED, Contender, Effort, Record, attempt
-from grasp_ros.accuracy.truth import Truth
+from grasp_ros.accuracy.measure import NOT_INSTALLED, Contender, Effort, Record, Truth, attempt
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from grasp_ros.accuracy.compare import Advice, by_method
-from grasp_ros.accuracy.measure import Record
-from grasp_ros.accuracy.truth import Truth
+from grasp_ros.accuracy.measure import Record, Truth
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Figure, colormaps

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from grasp_ros.accuracy.compare import SECONDS, Advice, advise, by_method, check_wish, compare, fastest
-from grasp_ros.accuracy.measure import DONE, Record, own_contenders
-from grasp_ros.accuracy.truth import Truth, finest
+from grasp_ros.accuracy.measure import DONE, Record, Truth, finest, own_contenders
 from grasp_ros.cli.arguments import add_command, add_file, add_json, add_scene
 from grasp_ros.cli.checks import check_output, load_scene, prepare
 from grasp_ros.cli.output import bar, figure_endings, show, write_figure

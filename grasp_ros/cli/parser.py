@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, NoReturn
 
+from grasp_ros.physics.errors import allowed
+
 Command = Callable[[argparse.Namespace], int]
 LONGEST = 250  # characters of a line that refuses something
 
@@ -36,7 +38,7 @@ class Parser(argparse.ArgumentParser):
         choice = re.fullmatch(r"argument (.*): invalid choice: '(.*?)' \(choose from (.*)\)", message, re.S)
         if choice is not None:
             known = re.findall(r"[\w-]+", choice[3])
-            message = f"argument {choice[1]}: {choice[2]} is not allowed; {_allowed(choice[2], known)}"
+            message = f"argument {choice[1]}: {choice[2]} is not allowed; {allowed(choice[2], known)}"
         self.exit(2, shortened(f"{self.prog}: error: {message}") + "\n")
 
     def _print_message(self, message: str, file: Any = None) -> None:
@@ -53,7 +55,7 @@ class Parser(argparse.ArgumentParser):
             parser: argparse.ArgumentParser = getattr(options, "parser", self)
             known = [word for action in parser._actions for word in action.option_strings]
             word = rest[0].split("=")[0]
-            meant = f"; {_allowed(word, known)}" if word.startswith("-") else ""
+            meant = f"; {allowed(word, known)}" if word.startswith("-") else ""
             parser.error(f"unrecognized arguments: {' '.join(rest)}{meant}")
         return options
 
@@ -62,12 +64,6 @@ def _number(word: str) -> float:
     from grasp_ros.physics.given import read_number
 
     return read_number(word)
-
-
-def _allowed(word: str, known: list[str]) -> str:
-    from grasp_ros.scene.suggestion import allowed  # with all of `scene`, which help should not wait for
-
-    return allowed(word, known)
 
 
 def add_levels(parser: argparse.ArgumentParser, default: object = argparse.SUPPRESS) -> None:

@@ -18,7 +18,7 @@ from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
 from grasp_ros.simulation.chunk import SETTLED
-from grasp_ros.simulation.summary import MOTION, OUTPUTS, TICKS
+from grasp_ros.simulation.quantities import MOTION, OUTPUTS, TICKS
 
 if TYPE_CHECKING:  # types of bags take long to import, and a simulation has none
     from grasp_ros.graph.bag.recording import Recording

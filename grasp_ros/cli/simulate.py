@@ -19,7 +19,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import GRID_POINTS, simulate
-from grasp_ros.simulation.ticks import tick_times
+from grasp_ros.simulation.sampled_plant import tick_times
 
 
 def add_to(commands: Any) -> None:
@@ -65,7 +65,7 @@ def _methods(options: argparse.Namespace) -> int:
 
 def _simulate(options: argparse.Namespace) -> int:
     from grasp_ros.cli.report import describe_sensitivity, describe_trajectory, last_rates, table
-    from grasp_ros.simulation.summary import summary
+    from grasp_ros.simulation.quantities import summary
 
     scene = load_scene(options.scene, options.settings)
     here = os.open(".", os.O_RDONLY)

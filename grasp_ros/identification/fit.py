@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from grasp_ros.identification.measured import FEWEST, INITIAL, Measured, Source, measured
+from grasp_ros.identification.measured import FEWEST, INITIAL, Source, measured
 from grasp_ros.identification.numbers import OFFSET, acts, numbers_of
 from grasp_ros.identification.result import CONFIDENCE, Against, Fit, identifiability_of, residual_table
 from grasp_ros.identification.search import FitProblem, first_noise, fitted, mean_square, missed, refine, search
@@ -57,7 +57,9 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
         check_scene(scene)
     free, found = names("free", free), measured(data, scene, truth("by_sensors", by_sensors))
     against = {key: number(f"against: {key}", value) for key, value in mapping("against", against).items()}
-    numbers = numbers_of(_begun(found, free), free, found)
+    seen = {key: float(found.state[0, place]) for place, key in enumerate(INITIAL) if place in found.channels}
+    begun = found.scene.changed({key: seen[key] for key in free if key in seen} if found.t[0] == 0.0 else {})
+    numbers = numbers_of(begun, free, found)
     if any(acts(number.key) for number in numbers):
         found = found._replace(inputs=None)
     if found.inputs is None and found.why_unknown:
@@ -72,12 +74,6 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
         raise Refused(f"{found.name}: {samples} measured numbers; allowed for {len(numbers)} free ones: at least"
                       f" {len(numbers) + FEWEST}")
     return _result(fitted(FitProblem(found, numbers, first_noise(found))), against)
-
-
-def _begun(data: Measured, free: Sequence[str]) -> Scene:
-    """The scene of the data, with those of the free initial values that were measured."""
-    seen = {key: float(data.state[0, place]) for place, key in enumerate(INITIAL) if place in data.channels}
-    return data.scene.changed({key: seen[key] for key in free if key in seen} if data.t[0] == 0.0 else {})
 
 
 def _result(problem: FitProblem, against: Mapping[str, float]) -> Fit:

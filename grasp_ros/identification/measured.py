@@ -16,15 +16,14 @@ from grasp_ros.graph.bag.recording import Recording
 from grasp_ros.graph.bag.verify import answers_of
 from grasp_ros.physics import given
 from grasp_ros.physics.domain import LARGEST_POSITION
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Refused, allowed
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import BODIES, NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.files import decoding, reading
-from grasp_ros.scene.suggestion import allowed
+from grasp_ros.simulation.sampled_plant import tick_times
 from grasp_ros.simulation.tables import COLUMNS, HEADS, TIME
-from grasp_ros.simulation.ticks import tick_times
 from grasp_ros.simulation.trajectory import Trajectory
 from grasp_ros.simulation.trajectory_file import load
 

@@ -9,12 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.identification.measured import CHANNELS, Measured
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Refused, allowed
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import BY_SECTION
 from grasp_ros.scene.effects.force import FORCED
-from grasp_ros.scene.suggestion import allowed
 from grasp_ros.sensitivity.directions import check_key
 
 OFFSET = "offset."  # of a sensor; the name of its channel follows

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -26,8 +27,7 @@ from grasp_ros.scene import Scene, compose
 from grasp_ros.sensitivity.directions import directions
 from grasp_ros.sensitivity.run import Carrier
 from grasp_ros.simulation.differentiate import complete
-from grasp_ros.simulation.sampled_plant import SampledPlant
-from grasp_ros.simulation.ticks import tick_of
+from grasp_ros.simulation.sampled_plant import SampledPlant, tick_of
 
 GROWTHS = (2.0, math.sqrt(2.0))  # of the horizon; the second where the first does not lead to a fit
 FIRST = 16.0  # part of the motion that is the first horizon
@@ -131,27 +131,25 @@ def refine(problem: FitProblem, begin: Array, rows: int, enough: float = FINE) -
     from scipy.optimize import least_squares
 
     seen, n = len(problem.data.channels), len(begin)
-    last: dict[bytes, tuple[Array, Array]] = {}
 
-    def both(step: Array) -> tuple[Array, Array]:
-        y = begin + step
-        if y.tobytes() not in last:
-            last.clear()
-            try:
-                values, slopes = problem.residuals(y, rows)
-            except Refused:  # a step into nowhere: the next one is shorter
-                values, slopes = np.full(rows * seen, np.nan), np.zeros((rows * seen, n))
-            last[y.tobytes()] = np.concatenate([values, y]), np.concatenate([slopes, np.eye(n)])
-        return last[y.tobytes()]
+    @lru_cache(maxsize=1)
+    def both(step: bytes) -> tuple[Array, Array]:
+        y = begin + np.frombuffer(step)
+        try:
+            values, slopes = problem.residuals(y, rows)
+        except Refused:  # a step into nowhere: the next one is shorter
+            values, slopes = np.full(rows * seen, np.nan), np.zeros((rows * seen, n))
+        return np.concatenate([values, y]), np.concatenate([slopes, np.eye(n)])
 
     nowhere = np.zeros(n)  # from 0 scipy tries steps up to 1 at first, from elsewhere up to as far as that is from 0
-    if not np.isfinite(both(nowhere)[0]).all():
+    if not np.isfinite(both(nowhere.tobytes())[0]).all():
         return begin
     with np.errstate(all="ignore"):  # of motions far off, and of numbers that are fixed
         away, width = np.array([(number.least - number.start, number.width) for number in problem.numbers]).T
         least = away / width - begin
-        found = least_squares(lambda step: both(step)[0], nowhere, lambda step: both(step)[1], (least, np.inf), "trf",
-                              ftol=enough, xtol=SHORTEST, gtol=None, max_nfev=MOST)
+        found = least_squares(
+            lambda step: both(step.tobytes())[0], nowhere, lambda step: both(step.tobytes())[1], (least, np.inf), "trf",
+            ftol=enough, xtol=SHORTEST, gtol=None, max_nfev=MOST)
     return np.asarray(begin + found.x)
 
 

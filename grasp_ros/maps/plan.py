@@ -16,8 +16,7 @@ from grasp_ros.physics.given import number, read_number, text, truth, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.places import parameter_of
-from grasp_ros.simulation.chunk import Setup, check
-from grasp_ros.simulation.variants import Variants
+from grasp_ros.simulation.chunk import Setup, Variants, check
 
 POINTS, MOST, MOST_AXES, DIGITS = 101, 10**9, 2, 15
 
@@ -149,7 +148,6 @@ class Plan:
     @staticmethod
     def from_document(document: dict[str, Any]) -> Plan:
         """The plan of a document."""
-        setup = Setup(**{**document["setup"], "outcomes": tuple(document["setup"]["outcomes"])})
         scene = scenes.parse(document["scene"], document["scene_name"], document["scene_name"])
         axes = tuple(Axis(**axis) for axis in document["axes"])
-        return Plan(scene, setup, axes, document["sample"], document["seed"])
+        return Plan(scene, Setup(**document["setup"]), axes, document["sample"], document["seed"])

@@ -11,10 +11,9 @@ from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, Method
 from grasp_ros.methods.equations import Work
 from grasp_ros.physics import layout
 from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Refused, allowed
 from grasp_ros.physics.given import number, text
 from grasp_ros.scene import PAPER, Scene
-from grasp_ros.scene.suggestion import allowed
 
 EXACT = "exact"
 MOST_STEPS = 1e9

@@ -209,7 +209,9 @@ def search(problem: DesignProblem, seed: int = 0, progress: Told | None = None) 
     found = differential_evolution(
         function, [(0.0, 1.0)] * len(problem.axes), popsize=MEMBERS, maxiter=GENERATIONS, tol=0.0, atol=-1.0, rng=seed,
         polish=False, init="sobol", updating="deferred", vectorized=True, callback=is_over)  # never by its own rule
-    places = _with_ends(found.x)
+    ends = np.where(np.abs(found.x - np.rint(found.x)) < BESIDE, np.rint(found.x), found.x)
+    single = np.where(np.eye(len(ends), dtype=bool), ends, found.x)
+    places = np.unique(np.vstack([found.x, ends, single]), axis=0)  # a population may stop just before an end
     reached = function(places.T)
     place, least = places[int(np.argmin(reached))], float(reached.min())
     if least >= BROKEN:
@@ -227,13 +229,6 @@ def search(problem: DesignProblem, seed: int = 0, progress: Told | None = None) 
     outcomes = {name: float(values[0]) for name, values in problem.found(best).outcomes.items()}
     numbers = {key: float(values[0]) for key, values in best.items()}
     return Design(problem.scene.changed(numbers), numbers, outcomes, runs)
-
-
-def _with_ends(place: Array) -> Array:
-    """A place (k,), and others (n, k) with numbers at the ends of ranges: a population may stop just before one."""
-    ends = np.where(np.abs(place - np.rint(place)) < BESIDE, np.rint(place), place)
-    single = np.where(np.eye(len(place), dtype=bool), ends, place)
-    return np.unique(np.vstack([place, ends, single]), axis=0)
 
 
 def front(problem: DesignProblem, seed: int = 0, progress: Told | None = None) -> list[Design]:

@@ -7,7 +7,7 @@ A shorter run of a scene inside is inside as well.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import NamedTuple
 
@@ -192,9 +192,7 @@ RULES = (
 def outside(system: System, duration: float) -> tuple[Rule, str, float] | None:
     """The first rule that a system breaks over a duration in s, the key, and what was measured; or None."""
     rows = Systems(system.closed_loop[None], system.pairs[None], system.state[None], duration)
-    for rule in RULES:
-        measured = rule.measure(rows)
-        wrong = _breaks(rule, measured)[0]
+    for rule, measured, wrong in _ruled(rows):
         if wrong.any():
             column = int(wrong.argmax())
             return rule, rule.keys[column], float(measured[0, column])
@@ -203,11 +201,11 @@ def outside(system: System, duration: float) -> tuple[Rule, str, float] | None:
 
 def outside_rows(rows: Systems) -> NDArray[np.bool_]:
     """Which of n systems break a rule, (n,)."""
-    broken = np.zeros(len(rows.x), dtype=bool)
+    return np.asarray(np.logical_or.reduce([wrong.any(axis=1) for _, _, wrong in _ruled(rows)]))
+
+
+def _ruled(rows: Systems) -> Iterator[tuple[Rule, Array, NDArray[np.bool_]]]:
+    """Each rule, what it measures of n systems, (n, k), and which of that breaks it."""
     for rule in RULES:
-        broken |= _breaks(rule, rule.measure(rows)).any(axis=1)
-    return broken
-
-
-def _breaks(rule: Rule, measured: Array) -> NDArray[np.bool_]:
-    return np.asarray(~((measured == 0.0) | ((measured >= rule.low) & (measured <= rule.high))))
+        measured = rule.measure(rows)
+        yield rule, measured, ~((measured == 0.0) | ((measured >= rule.low) & (measured <= rule.high)))

@@ -1,12 +1,16 @@
-"""Input that is refused. Command line and nodes print it in one line; any other exception is a bug."""
+"""Input that is refused, and what was meant. Command line and nodes print it in a line; another exception is a bug."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
+from itertools import islice
 from traceback import extract_tb
 
 OTHERS = re.compile("/lib/python3[^/]*/(?!(site|dist)-packages/(?!(rclpy|numba)/))")  # of Python, rclpy, numba
 LONGEST = 4000  # characters of a sentence
+SHOWN = 12  # of many words that are allowed
+ALIKE, TIE, MOST_MEANT = 0.65, 1e-9, 4  # of difflib; words that are as much alike are all named
 
 
 def printable(text: str) -> str:
@@ -48,3 +52,16 @@ class Failed(Refused):
     """What was accepted and has failed: nobody answers, a law of the user's gives no command."""
 
     exit_status = 1
+
+
+def allowed(word: str, known: Collection[str], other: str = "") -> str:
+    """The end of a refusal: the known word that is meant, or the first that are allowed, behind `other` words."""
+    from difflib import SequenceMatcher, get_close_matches  # which what is right need not wait for
+
+    close = get_close_matches(word, known, MOST_MEANT, ALIKE)
+    alike = {name: SequenceMatcher(None, name, word).ratio() for name in close}
+    best = [name for name in close if alike[name] >= alike[close[0]] - TIE]
+    if best:
+        return f"did you mean {' or '.join(sorted(best))}?"
+    rest = f", ... {len(known)} in all" if len(known) > SHOWN else ""
+    return f"allowed: {other}{', '.join(islice(known, SHOWN))}{rest}"

@@ -28,7 +28,6 @@ def check_scene(scene: object) -> None:
 
 def parameter_of(scene: Scene, name: str) -> Parameter:
     """What a number of a scene is, by "section.key"; lists are refused."""
-    check_scene(scene)
     if (parameter := scene.parameter(name)).several:
         raise Refused(f"{scene.name}: {name}: is a list; allowed: single numbers")
     return parameter

@@ -17,7 +17,7 @@ from typing import Any
 
 from grasp_ros import CONFIG
 from grasp_ros.physics import given
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Refused, allowed
 from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
@@ -29,7 +29,6 @@ from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.settings import apply, texts_of_changed
 from grasp_ros.scene.strict_yaml import dump
 from grasp_ros.scene.strict_yaml import load as load_yaml
-from grasp_ros.scene.suggestion import allowed
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, Topic
 from grasp_ros.scene.validation import SceneError, check_domain, check_keys, check_together, read_sections, read_texts
 

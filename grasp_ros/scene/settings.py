@@ -7,10 +7,9 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Refused, allowed
 from grasp_ros.scene.effects import BY_SECTION
 from grasp_ros.scene.strict_yaml import load
-from grasp_ros.scene.suggestion import allowed
 from grasp_ros.scene.validation import SceneError
 
 FEW = 2  # changes that a title names

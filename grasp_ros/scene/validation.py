@@ -8,10 +8,10 @@ from typing import Any
 
 from grasp_ros.physics.domain import outside
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import allowed as what_is_allowed
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects import BY_SECTION, named
 from grasp_ros.scene.effects.base import Effect
-from grasp_ros.scene.suggestion import allowed as what_is_allowed
 
 CONTROLS = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\ud800-\udfff]")  # categories Cc, without the line break, and Cs
 SOMETHING = frozenset(("left_arm", "object", "right_arm"))

@@ -23,7 +23,7 @@ from grasp_ros.scene.effects import build
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.effects.force import FORCED
 from grasp_ros.scene.parameter import Parameter
-from grasp_ros.scene.places import check_scene, parameter_of, place_of
+from grasp_ros.scene.places import parameter_of, place_of
 
 NOT_SMOOTH = {  # by the unit of a number: why no derivative is to be had
     "s": "it moves ticks, which are whole", "Hz": "its effect grows with the time; allowed: phase_rad",
@@ -98,7 +98,6 @@ def check_keys(scene: Scene, keys: Sequence[str], sampled: bool) -> list[Paramet
     Refused
         If the scene does not name a number, or it does not enter smoothly, or a sensor measures in steps.
     """
-    check_scene(scene)
     if not keys:
         raise Refused(f"{scene.name}: sensitivity: nothing; allowed: numbers of the scene, such as object.position_m")
     for side, law in scene.system.laws.items():

@@ -28,8 +28,7 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.own_law import begin
-from grasp_ros.simulation.sampled_plant import Outputs, SampledPlant
-from grasp_ros.simulation.ticks import LoopRecord, new_loop
+from grasp_ros.simulation.sampled_plant import LoopRecord, Outputs, SampledPlant, new_loop
 
 Progress = Callable[[float], object] | None
 PATIENCE = 0.1  # s that a block of ticks may take
@@ -42,8 +41,6 @@ NO_USER_CONTROLLERS: Mapping[int, UserController] = MappingProxyType({})
 def wrap_controllers(scene: Scene, controllers: Mapping[str, Law | type]) -> dict[int, UserController]:
     """Controllers from outside by side, as the kernels call them, at the beginning of a run."""
     found: dict[int, UserController] = {}
-    if not controllers:
-        return found
     arms = [side for side, body in SIDES.items() if scene.system.bodies[body, Of.MASS] > 0.0]
     for side, law in controllers.items():
         if side not in arms:

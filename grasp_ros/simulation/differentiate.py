@@ -21,13 +21,12 @@ from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.directions import Directions, closing, directions
 from grasp_ros.sensitivity.event_times import Moments, event_rates
 from grasp_ros.sensitivity.run import Carrier
-from grasp_ros.simulation.chunk import Chunk, Setup
+from grasp_ros.simulation.chunk import Chunk, Setup, Variants
 from grasp_ros.simulation.closed_loop import drive
 from grasp_ros.simulation.outcomes import DIFFERENTIATED, derivatives_by
 from grasp_ros.simulation.repeat import check_same, integrator_of
 from grasp_ros.simulation.simulate import simulate
 from grasp_ros.simulation.trajectory import Trajectory
-from grasp_ros.simulation.variants import Variants
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,11 +28,10 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.files import opened
 from grasp_ros.scene.places import parameter_of
 from grasp_ros.sensitivity.directions import check_keys
-from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, check, compute, has_inputs
+from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, Variants, check, compute, has_inputs
 from grasp_ros.simulation.outcomes import BY, CORNER, OUTCOMES, V_C_END, derivatives_by
 from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.tables import frame_of, write_rows
-from grasp_ros.simulation.variants import Variants
 
 CHUNK_S, ROW_S, TICK_S = 0.1, 2e-4, 1e-6  # seconds that a chunk is meant to take, and that its parts take about
 Span = tuple[int, int]  # first row of a chunk, and the one behind its last

@@ -15,8 +15,7 @@ from grasp_ros.physics.energy import pairs_of
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Of
 from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
 from grasp_ros.physics.system import COLUMN, System
-from grasp_ros.simulation.quantities import as_row
-from grasp_ros.simulation.repeat import at_every_tick
+from grasp_ros.simulation.repeat import as_row, at_every_tick
 from grasp_ros.simulation.trajectory import Trajectory, check_run
 
 
@@ -85,7 +84,7 @@ def _moves(run: Trajectory) -> Array:
 
 
 def losses_of(run: Trajectory, row: Mapping[str, float] | None) -> Losses:
-    """The losses from the row of an exact run that has its energies, see `quantities.as_row`, and `needs_ticks`.
+    """The losses from the row of an exact run that has its energies, see `repeat.as_row`, and `needs_ticks`.
 
     Without a row by the trapezoidal rule, of a run whose output times hold every control period.
     """

@@ -12,12 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.observe.record import SEEN, Quantity, Seen, Wanted
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Refused, allowed
 from grasp_ros.physics.layout import U
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.suggestion import allowed
 from grasp_ros.simulation.tables import COLUMNS
 
 NOTHING = Wanted(0)

@@ -1,4 +1,4 @@
-"""What a motion amounts to in a few numbers: settling times, contacts and impact forces.
+"""What a motion amounts to in a few numbers: settling times, contacts, and the summary, which `grasp simulate` prints.
 
 Settled is one definition for the whole package: no mass leaves 2 % of the largest initial displacement any more, for
 good, which V_c proves: it never rises, and its level bounds what follows, see `physics.lyapunov`. A run goes on past
@@ -8,23 +8,34 @@ its horizon until that is decided. What V_c does not prove within HORIZONS horiz
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any
 
 import numpy as np
 
-from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.methods.registry import EXACT
+from grasp_ros.exact.integrator import Status
+from grasp_ros.methods.registry import METHODS
+from grasp_ros.physics.accuracy import ACCURACY
+from grasp_ros.physics.energy import energy
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import whole
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
 from grasp_ros.physics.lyapunov import displacement_bound
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
-from grasp_ros.simulation.chunk import HORIZONS, SETTLED, Setup, compute
-from grasp_ros.simulation.closed_loop import drive
+from grasp_ros.scene.effects.base import SIDES
+from grasp_ros.simulation.chunk import HORIZONS, SETTLED
 from grasp_ros.simulation.contacts import intervals, side_of
+from grasp_ros.simulation.losses import external_work, losses_of, needs_ticks
 from grasp_ros.simulation.outcomes import GROUPS
-from grasp_ros.simulation.repeat import UNLIMITED, has_ticks, with_commands
+from grasp_ros.simulation.repeat import as_row, at_every_tick
 from grasp_ros.simulation.trajectory import Trajectory, check_run
-from grasp_ros.simulation.variants import Variants
+
+MOTION, OUTPUTS, TICKS = "motion", "output times", "control periods"  # what a number is of
+MOST_TICKS = 1_000_000  # for which a run is repeated for the sake of a table
+FORCES = ("input_left", "input_right", "impact_left", "impact_right")  # as in the columns of `tables`
+PEAKS = (*GROUPS["peak_input"], *GROUPS["peak_impact"])  # in the order of FORCES
 
 
 def settled_distance(scene: Scene, part: float = SETTLED) -> float:
@@ -48,28 +59,6 @@ def last_outside(t: Array, position: Array, distance: float) -> Array:
         else:
             share = (x[row] - distance) / (x[row] - x[row + 1])
             found[column] = t[row] + share * (t[row + 1] - t[row])
-    return found
-
-
-def as_row(run: Trajectory, *outcomes: str, horizons: int = HORIZONS) -> dict[str, float] | None:
-    """Outcomes of an exact run, those of a row of an ensemble: it is integrated again, and watched.
-
-    Other controllers than the scene's act by their recorded commands. None for another method, a run that stopped, one
-    that ends elsewhere, and where such commands were not recorded at every control period.
-    """
-    end = np.array([run.scene.duration])
-    if run.method != EXACT or run.status is not Status.DONE or (run.controllers and not has_ticks(run, end)):
-        return None
-    setup = Setup((*outcomes, "last_state"), run.setting, run.sampled, SETTLED, horizons, UNLIMITED, UNLIMITED)
-
-    def again(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -> Array:
-        return with_commands(run, end, integrator) if run.controllers else drive(scene, integrator, sampled, grid)
-
-    columns = compute(Variants(run.scene, {}), setup, move=again).columns
-    found = {name: float(own[0]) for name, own in columns.items()}
-    last = [found[name] for name in GROUPS["last_state"]]
-    if run.sampled and not np.array_equal([[run.scene.duration, *last]], np.c_[run.t, run.state][-1:], equal_nan=True):
-        return None
     return found
 
 
@@ -115,3 +104,74 @@ def may_settle(run: Trajectory) -> bool:
 def contact_intervals(run: Trajectory, side: str) -> Array:
     """Begin and end of every stretch with u > 0 of the "left" or "right" arm, (n, 2) in s."""
     return intervals(check_run(run), side_of(side))[:, :2]
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def summary(run: Trajectory) -> dict[str, Any]:
+    """Numbers of a run by names that end with their unit; what the run does not have is left out.
+
+    `settled_s` has infinity where V_c does not prove within `settled_within_s` that a mass has settled. Where V_c may
+    rise, `last_outside_s` has the last times outside the same bound in its place.
+    `touches` is left out for methods that do not look for them. V_c is twice the energy, at two times: half of
+    what it falls by between them is what was lost less the work of external forces.
+    """
+    scene, method = check_run(run).scene, METHODS[run.method]
+    found: dict[str, Any] = {
+        "scene": scene.name, "title": scene.title, "watch": scene.watch, "warnings": list(scene.warnings),
+        "feedback": scene.feedback_in_words(run.sampled, bool(run.controllers)), "controllers": dict(run.controllers),
+        "status": run.status.name, "stop": run.stop, "duration_s": scene.duration, "output_times": len(run.t),
+        "reached_s": scene.duration if run.status is Status.DONE else float(max([0.0, *run.t[-1:]])),
+        "method": method.name, method.knob: run.setting, "work": run.counters,
+        "certificate": "none: V_c needs the energy of every controller" if run.controllers
+        else scene.certificate_in_words(run.sampled),
+    }
+    if run.at_rest is not None:
+        found["at_rest_s"] = run.at_rest
+    if method.events:
+        found["touches"] = {name: len(run.times(Transition.TOUCH, side)) for name, side in SIDES.items()}
+        found["clamped"] = {name: len(run.times(Transition.CLAMP, side)) for name, side in SIDES.items()}
+        found["sticks"] = len(run.times(Transition.STICK, OBJECT))
+    if len(run.t):
+        found |= _amounts(run)
+    return found
+
+
+def _amounts(run: Trajectory) -> dict[str, Any]:
+    """Energies, settling times, largest forces and losses, as far as the scene has them."""
+    scene, distance, settles = run.scene, settled_distance(run.scene), may_settle(run)
+    row = as_row(run, *PEAKS, "energy", "settling_times" if settles else "last_outside_times")
+    dense = None
+    if (row is None or needs_ticks(run)) and scene.ticks <= max(MOST_TICKS, len(run.t)):
+        with suppress(Refused):  # a run that cannot be repeated
+            dense = at_every_tick(run)
+    known = run if dense is None else dense
+    ends, at = known.state[[0, -1]], known.t[[0, -1]].tolist()
+    if row is not None:
+        ends, at = np.stack([scene.initial_state, [row[name] for name in GROUPS["last_state"]]]), [0.0, scene.duration]
+    level = energy(scene.system, ends, feedback=not run.controllers).V_c
+    found: dict[str, Any] = {"energy_of": run.energy_of, "V_c_J": level.tolist(), "V_c_at_s": at}
+    if not METHODS[run.method].energy_check or (run.setting > ACCURACY and not may_rise(run)):
+        V_c = known.energy.V_c
+        found["V_c_rise_J"] = float((V_c - np.minimum.accumulate(V_c)).max())
+    if settles and not np.isnan(settled := settled_of(known, row)).any():
+        found["settled_s"] = _by_body(run, settled)
+        found["settled_within_s"] = float(run.t[-1]) if row is None else HORIZONS * scene.duration
+    if may_rise(run) and distance > 0.0 and not (row is None and dense is None):
+        found["last_outside_s"] = _by_body(run, last_outside_of(known, row))
+    if row is None:
+        found["largest_of"] = OUTPUTS if dense is None else TICKS
+        acted = np.fmax.reduce(np.abs(known.inputs[:, [LEFT, RIGHT]]), initial=0.0)  # nan: nothing acts from the end on
+        largest = [*acted.tolist(), *known.impacts.max(axis=0).tolist()]
+    else:
+        found["largest_of"], largest = MOTION, [row[name] for name in PEAKS]
+    found["largest_N"] = dict(zip(FORCES, largest, strict=True))
+    if (dense is not None and len(dense.t) > 1) or (row is not None and not needs_ticks(run)):
+        found["lost_J"] = {cause: float(value) for cause, value in losses_of(known, row)._asdict().items()}
+        found["lost_by"] = TICKS if row is None else MOTION
+        if scene.system.external:
+            found["work_external_J"] = external_work(known, row)
+    return found
+
+
+def _by_body(run: Trajectory, times: Array) -> dict[str, float]:
+    return {NAMES[body]: float(times[COLUMN[body] // 2]) for body in run.scene.system.present}

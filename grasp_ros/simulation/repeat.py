@@ -1,4 +1,4 @@
-"""Dense output: a run again, with other output times.
+"""A run again, with other output times, which is its dense output, or watched, for its outcomes.
 
 No state depends on the other output times, not in its last bit, so that the run with the wanted times is the dense
 output. It costs as much as the run, and holds for every method. Commands that were recorded at every control period are
@@ -18,10 +18,12 @@ from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import OBJECT, Entry
 from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.simulation.closed_loop import outputs_within, solve
-from grasp_ros.simulation.sampled_plant import SampledPlant
-from grasp_ros.simulation.ticks import LoopRecord, tick_of, tick_times
+from grasp_ros.simulation.chunk import HORIZONS, SETTLED, Setup, Variants, compute
+from grasp_ros.simulation.closed_loop import drive, outputs_within, solve
+from grasp_ros.simulation.outcomes import GROUPS
+from grasp_ros.simulation.sampled_plant import LoopRecord, SampledPlant, tick_of, tick_times
 
 if TYPE_CHECKING:  # it imports this file
     from grasp_ros.simulation.trajectory import Trajectory
@@ -120,3 +122,25 @@ def with_commands(run: Trajectory, grid: Array, integrator: Integrator) -> Array
         states = np.concatenate([states, np.repeat(plant.state[None], len(grid) - len(states), axis=0)])
     states[:, scene.system.absent_columns] = np.nan
     return states
+
+
+def as_row(run: Trajectory, *outcomes: str, horizons: int = HORIZONS) -> dict[str, float] | None:
+    """Outcomes of an exact run, those of a row of an ensemble: it is integrated again, and watched.
+
+    Other controllers than the scene's act by their recorded commands. None for another method, a run that stopped, one
+    that ends elsewhere, and where such commands were not recorded at every control period.
+    """
+    end = np.array([run.scene.duration])
+    if run.method != EXACT or run.status is not Status.DONE or (run.controllers and not has_ticks(run, end)):
+        return None
+    setup = Setup((*outcomes, "last_state"), run.setting, run.sampled, SETTLED, horizons, UNLIMITED, UNLIMITED)
+
+    def again(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -> Array:
+        return with_commands(run, end, integrator) if run.controllers else drive(scene, integrator, sampled, grid)
+
+    columns = compute(Variants(run.scene, {}), setup, move=again).columns
+    found = {name: float(own[0]) for name, own in columns.items()}
+    last = [found[name] for name in GROUPS["last_state"]]
+    if run.sampled and not np.array_equal([[run.scene.duration, *last]], np.c_[run.t, run.state][-1:], equal_nan=True):
+        return None
+    return found

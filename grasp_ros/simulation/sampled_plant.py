@@ -1,4 +1,4 @@
-"""The plant of a sampled loop: the one place where a command waits, is held over a control period, and acts."""
+"""The sampled loop: its ticks, and its plant, the one place where a command waits, is held over a period, and acts."""
 
 from __future__ import annotations
 
@@ -18,9 +18,35 @@ from grasp_ros.physics.layout import Answer, Place
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.observation import Observation
 from grasp_ros.physics.system import COLUMN, System
+from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
 
 NO_TIMES = np.zeros(0)
+
+
+def tick_times(scene: Scene) -> Array:
+    """Times in s of all control periods of a scene, shape (ticks + 1,)."""
+    return np.arange(scene.ticks + 1) * scene.period_ns / NANOSECONDS
+
+
+def tick_of(scene: Scene, t: Array) -> NDArray[np.int64]:
+    """The last tick at or before each time in s, shape (n,)."""
+    ticks = np.floor(np.asarray(t) * (NANOSECONDS / scene.period_ns)).astype(np.int64)  # rounding may miss it by one
+    ticks -= ticks * scene.period_ns / NANOSECONDS > t
+    ticks += (ticks + 1) * scene.period_ns / NANOSECONDS <= t
+    return np.minimum(ticks, scene.ticks)
+
+
+class LoopRecord(NamedTuple):
+    """What went through a sampled loop, at n output times; see `Trajectory.command` and `Trajectory.inputs`."""
+
+    command: Array  # (n, 2), N
+    inputs: Array  # (n, 3), N by body
+
+
+def new_loop(n: int) -> LoopRecord:
+    """A record of n output times, to be filled."""
+    return LoopRecord(np.empty((n, 2)), np.full((n, 3), np.nan))
 
 
 class Outputs(NamedTuple):

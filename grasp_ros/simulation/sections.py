@@ -63,7 +63,8 @@ def crossings(function: Function, direction: int, breaks: Array, states: States)
     ends = np.concatenate([breaks[:1], t, breaks[-1:]])
     middles = 0.5 * (ends[1:] + ends[:-1])
     values = function(middles, states(middles))
-    signs = _carried(np.sign(values))
+    signs = np.sign(values).astype(np.int64)
+    signs = signs[np.maximum.accumulate(np.where(signs != 0, np.arange(len(signs)), 0))]  # 0 counts as the one before
     turn = np.where(signs[:-1] != 0, np.sign(np.diff(signs)), 0)
     kept = (turn != 0) & ((turn == direction) | (direction == 0))
     t = t[kept]
@@ -82,12 +83,6 @@ def _checked(values: ArrayLike, t: Array) -> Array:
         raise Refused(f"section: gives numbers of shape {found.shape} for times of shape {t.shape}, or some that are"
                       " not finite, as the state of a body that is not there; allowed: a finite number for each")
     return found
-
-
-def _carried(signs: Array) -> NDArray[np.int64]:
-    """Signs with each 0 replaced by the last one before it that is none."""
-    last = np.maximum.accumulate(np.where(signs != 0.0, np.arange(len(signs)), 0))
-    return signs[last].astype(np.int64)
 
 
 def _candidates(pieces: Pieces) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ from grasp_ros.scene.places import check_scene
 from grasp_ros.sensitivity.directions import check_keys
 from grasp_ros.simulation.closed_loop import NO_CHANGES, Changes, Progress, check_changes, solve, wrap_controllers
 from grasp_ros.simulation.progress import showing
-from grasp_ros.simulation.ticks import tick_times
+from grasp_ros.simulation.sampled_plant import tick_times
 from grasp_ros.simulation.trajectory import Trajectory
 
 GRID_POINTS = 2001
@@ -98,10 +98,10 @@ def simulate(
         if method != EXACT or controllers or changes:
             raise Refused(f"{scene.name}: sensitivity: allowed: the method {EXACT}, without controllers and changes")
     setting = registry.check(method, scene, setting, sampled=sampled, max_work=max_work)
+    _check_ticks(scene, sampled, max_work)
     if grid is None:
         grid = tick_times(scene) if sampled else np.linspace(0.0, scene.duration, GRID_POINTS)
     grid = ascending("grid", grid, scene.duration)  # new: kernels are compiled anew for arrays that nobody may write to
-    _check_ticks(scene, sampled, max_work)
     by_user = wrap_controllers(scene, controllers)
     with showing(progress, scene.duration, "s", scene.name) as progress:
         found, loop = solve(scene, grid, method, setting, sampled, max_events, max_work, changes, by_user, progress)

@@ -28,17 +28,12 @@ from grasp_ros.scene.files import opened
 from grasp_ros.scene.npz import signed
 from grasp_ros.simulation.contacts import check_located, contact_table, side_of
 from grasp_ros.simulation.repeat import breaks_of, states_at
+from grasp_ros.simulation.sampled_plant import LoopRecord, tick_of
 from grasp_ros.simulation.sections import Function, Section, as_function, crossings
 from grasp_ros.simulation.tables import Tabular
-from grasp_ros.simulation.ticks import LoopRecord, tick_of
 
 if TYPE_CHECKING:
     from grasp_ros.simulation.differentiate import Sensitivity
-
-MOMENTS: dict[str, tuple[Transition, int]] = {  # arrays of a file with times of events
-    f"{kind.name.lower()}_{name}": (kind, side)
-    for kind in (Transition.TOUCH, Transition.RELEASE) for name, side in SIDES.items()
-}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -279,7 +274,8 @@ class Trajectory(Tabular, Frozen):
             t=self.t, state=self.state, command=self.command, inputs=self.inputs,
             V=level.V, V_c=level.V_c, V_rate=level.V_rate, mode=level.mode, **self.parts._asdict(),
             epsilon=self.epsilon, impacts=self.impacts,
-            **{name: self.times(*which) for name, which in MOMENTS.items() if METHODS[self.method].events},
+            **{f"{kind.name.lower()}_{name}": self.times(kind, side) for kind in (Transition.TOUCH, Transition.RELEASE)
+               for name, side in SIDES.items() if METHODS[self.method].events},
             events=self.event_table, work=self.work,
             work_names=np.array([name.replace(" ", "_") for name in self.counters]), status=self.status.name,
             method=self.method, setting=float(self.setting), sampled=self.sampled, stop=self.stop,

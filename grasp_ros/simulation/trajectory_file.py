@@ -16,7 +16,7 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.files import decoding, reading
 from grasp_ros.scene.npz import TEXT, read_npz
-from grasp_ros.simulation.ticks import LoopRecord, tick_of
+from grasp_ros.simulation.sampled_plant import LoopRecord, tick_of
 from grasp_ros.simulation.trajectory import Trajectory
 
 

@@ -15,7 +15,7 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.simulation import Trajectory
-from grasp_ros.simulation.ticks import tick_of, tick_times
+from grasp_ros.simulation.sampled_plant import tick_of, tick_times
 
 NODES = 15  # of Gauss and Legendre in each part of a piece
 MOST_SEGMENTS = 1000  # beyond: those at both ends of the run, and every n-th between them

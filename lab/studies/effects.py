@@ -28,7 +28,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import BY_SECTION, EFFECTS
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.closed_loop import drive
-from grasp_ros.simulation.ticks import tick_times
+from grasp_ros.simulation.sampled_plant import tick_times
 from lab.drills import recorder
 from lab.studies import page_figures, pages
 from lab.studies.segment_clock import SegmentClock

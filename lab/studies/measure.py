@@ -10,8 +10,7 @@ import numpy as np
 
 from grasp_ros import simulation
 from grasp_ros.accuracy import measure
-from grasp_ros.accuracy.measure import NOT_INSTALLED, Contender, Record
-from grasp_ros.accuracy.truth import Truth
+from grasp_ros.accuracy.measure import NOT_INSTALLED, Contender, Record, Truth
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.scene import Scene
 from lab import reference

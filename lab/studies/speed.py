@@ -9,8 +9,7 @@ import statistics
 from functools import partial
 from typing import NamedTuple
 
-from grasp_ros.accuracy.measure import Contender, Record, contender_of
-from grasp_ros.accuracy.truth import Truth
+from grasp_ros.accuracy.measure import Contender, Record, Truth, contender_of
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.scene import Scene
 from lab.studies import measure, peer_heyoka

@@ -15,8 +15,7 @@ from measurements import record
 
 from grasp_ros import scene as scenes
 from grasp_ros.accuracy.compare import QUICK, advise, compare, fastest
-from grasp_ros.accuracy.measure import NOT_INSTALLED, Answer, Contender, attempt, own_contenders
-from grasp_ros.accuracy.truth import Truth, finest
+from grasp_ros.accuracy.measure import NOT_INSTALLED, Answer, Contender, Truth, attempt, finest, own_contenders
 from grasp_ros.cli.accuracy import _not_here, _table
 from grasp_ros.physics.errors import Refused
 from grasp_ros.simulation import simulate

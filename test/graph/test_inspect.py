@@ -17,7 +17,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.simulation import Trajectory, simulate
-from grasp_ros.simulation.ticks import LoopRecord
+from grasp_ros.simulation.sampled_plant import LoopRecord
 from lab.drills import recorder
 
 NOISY = ["time.duration_s=0.5", "loop.delay_ticks=3", "left_sensor.noise_seed=7", "left_sensor.position_noise_m=1e-3",

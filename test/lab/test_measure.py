@@ -13,8 +13,7 @@ import pytest
 from documents import horizon, stalling
 
 from grasp_ros import scene as scenes
-from grasp_ros.accuracy.measure import Answer, Contender, Record, contender_of
-from grasp_ros.accuracy.truth import Truth, finest
+from grasp_ros.accuracy.measure import Answer, Contender, Record, Truth, contender_of, finest
 from lab.studies import accuracy, figures, measure
 from lab.studies.records import Journal, write_csv
 

@@ -17,7 +17,7 @@ from grasp_ros.simulation import Trajectory, simulate
 from grasp_ros.simulation.chunk import SETTLED, Setup
 from grasp_ros.simulation.ensemble import Table, ensemble
 from grasp_ros.simulation.outcomes import GROUPS, LYAPUNOV
-from grasp_ros.simulation.summary import summary
+from grasp_ros.simulation.quantities import summary
 from lab.oracles.closed_forms import impact_numbers
 
 EVERY = tuple(group for group in GROUPS if group != LYAPUNOV)

@@ -13,7 +13,7 @@ import pytest
 import grasp_ros as gr
 from grasp_ros.maps.plan import Axis
 from grasp_ros.optimization.search import DesignProblem, front, read_bound
-from grasp_ros.simulation.summary import summary
+from grasp_ros.simulation.quantities import summary
 
 BOTH_KV = "left_feedback.velocity_gain_Ns_per_m+right_feedback.velocity_gain_Ns_per_m"
 BOTH_KP = "left_feedback.position_gain_N_per_m+right_feedback.position_gain_N_per_m"

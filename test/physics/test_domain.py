@@ -15,7 +15,7 @@ from grasp_ros.physics.domain import RANGES, RULES, SMALLEST, Systems, outside
 from grasp_ros.physics.layout import EPS
 from grasp_ros.scene import Scene, SceneError
 from grasp_ros.scene.effects import EFFECTS
-from grasp_ros.simulation.variants import Variants
+from grasp_ros.simulation.chunk import Variants
 from lab.oracles.metamorphic import scaled
 
 

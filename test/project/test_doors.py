@@ -89,8 +89,9 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize("sampled", [False, True])
 def test_more_control_periods_than_any_run_can_have_are_refused_at_once(sampled: bool) -> None:
     settings = ["object_sine.amplitude_N=1", "object_sine.frequency_Hz=1", "time.duration_s=1e9"]
-    with pytest.raises(Refused, match=r"\d{12,} control periods with an input each; allowed: max_work, "):
-        simulate(scenes.load("case_01", settings), sampled=sampled, grid=np.array([0.0, 1.0]))
+    for grid in (None, np.array([0.0, 1.0])):
+        with pytest.raises(Refused, match=r"\d{12,} control periods with an input each; allowed: max_work, "):
+            simulate(scenes.load("case_01", settings), sampled=sampled, grid=grid)
 
 
 @pytest.fixture(scope="module")

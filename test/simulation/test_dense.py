@@ -14,7 +14,7 @@ from grasp_ros import scene
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, Transition
 from grasp_ros.simulation import Trajectory, ensemble, load, simulate
-from grasp_ros.simulation.summary import summary
+from grasp_ros.simulation.quantities import summary
 
 TIMES = np.array([1.7, 0.0, 0.43070539, 2.0, 0.43070539, 1.23456789])
 RUNS = {

@@ -12,11 +12,10 @@ from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene, SceneError
 from grasp_ros.simulation import simulate
-from grasp_ros.simulation.chunk import REFUSED, STATUSES, Setup
+from grasp_ros.simulation.chunk import PLACES, REFUSED, STATUSES, Setup, Variants
 from grasp_ros.simulation.ensemble import Table, ensemble
 from grasp_ros.simulation.outcomes import GROUPS
 from grasp_ros.simulation.quantities import settling_times
-from grasp_ros.simulation.variants import PLACES, Variants
 
 OUTCOMES = ("settling_time", "touches", "last_state")
 ROWS = 24
@@ -108,7 +107,7 @@ def test_arrays_are_built_and_refused_like_scenes() -> None:
     for name, values in named.items():
         variants = Variants(scene, {name: values})
         assert variants.is_plain
-        block, faults = variants.block(), variants.faults()
+        block, faults = variants.block, variants.faults()
         for i in range(variants.rows):
             if i in faults:
                 with pytest.raises(SceneError) as refusal:

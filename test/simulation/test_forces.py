@@ -13,7 +13,7 @@ from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import closed_loop, simulate
-from grasp_ros.simulation.ticks import tick_times
+from grasp_ros.simulation.sampled_plant import tick_times
 from lab.oracles.closed_forms import holding_force
 
 

@@ -18,9 +18,8 @@ from grasp_ros.simulation import simulate
 from grasp_ros.simulation.chunk import Setup
 from grasp_ros.simulation.ensemble import ensemble
 from grasp_ros.simulation.losses import losses
-from grasp_ros.simulation.quantities import HORIZONS, contact_intervals, last_outside, settling_times
-from grasp_ros.simulation.summary import MOTION, summary
-from grasp_ros.simulation.ticks import tick_times
+from grasp_ros.simulation.quantities import HORIZONS, MOTION, contact_intervals, last_outside, settling_times, summary
+from grasp_ros.simulation.sampled_plant import tick_times
 from lab.paper.figures import running_losses
 
 

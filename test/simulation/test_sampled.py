@@ -21,7 +21,7 @@ from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import SampledPlant, simulate
-from grasp_ros.simulation.ticks import tick_of, tick_times
+from grasp_ros.simulation.sampled_plant import tick_of, tick_times
 from lab.reference.grasp import feedback
 
 

@@ -20,10 +20,9 @@ from rclpy.subscription import Subscription
 
 from grasp_ros.graph.parameters import FREE, PARAMETERS
 from grasp_ros.graph.ros import messages
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Refused, allowed
 from grasp_ros.physics.given import plain
 from grasp_ros.scene import Scene, strict_yaml
-from grasp_ros.scene.suggestion import allowed
 
 FILE = "--params-file"
 SIM_TIME = "use_sim_time"  # rclpy lets anybody set it at any time

@@ -26,9 +26,8 @@ from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.graph.ros.parameter_node import refusing
 from grasp_ros.graph.stopping import note_signals, on_signals
-from grasp_ros.physics.errors import Failed, Refused
+from grasp_ros.physics.errors import Failed, Refused, allowed
 from grasp_ros.scene import strict_yaml
-from grasp_ros.scene.suggestion import allowed
 from grasp_ros.scene.topics import Topic
 
 PATIENCE_SECONDS = 15.0  # without an answer, or without progress; to be found takes over 5 s on a busy machine
