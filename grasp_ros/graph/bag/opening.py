@@ -80,12 +80,14 @@ class Opened:
             self.names = names_of(self.scene, own)
             known = {(name, topic.type): topic for topic, name in self.names.items()}
             everything: Iterable[Stored] = chain(first, messages)
-            if not self.storage.library.startswith(LIBRARY) and _jumps_back(path, salvage):
-                # Topics lie one behind the other, each in its order.
-                rows = defaultdict[str, list[Stored]](list)
-                for stored in everything:
-                    rows[stored.topic].append(stored)
-                everything = merge(*rows.values(), key=attrgetter("time_ns"))
+            if not self.storage.library.startswith(LIBRARY):
+                again = open_storage(path, salvage).messages()
+                if any(after.time_ns < before.time_ns for before, after in pairwise(again)):
+                    # Topics lie one behind the other, each in its order.
+                    rows = defaultdict[str, list[Stored]](list)
+                    for stored in everything:
+                        rows[stored.topic].append(stored)
+                    everything = merge(*rows.values(), key=attrgetter("time_ns"))
             self.foreign: Counter[str] = Counter()  # messages by topic that a bag which is salvaged leaves out
             self.messages = self._known(known, everything, salvage)  # each with its topic
             # Topics whose messages are as they came, not one for each tick: those of commands in a free run.
@@ -102,11 +104,6 @@ class Opened:
                 else:
                     raise BagError(f"{self.path}: {stored.topic}: {stored.type} is not a topic of its scene;"
                                    " `grasp recover` leaves it out")
-
-
-def _jumps_back(path: Path, salvage: bool) -> bool:
-    """Whether the messages of a file are in another order than that of their times."""
-    return any(after.time_ns < before.time_ns for before, after in pairwise(open_storage(path, salvage).messages()))
 
 
 def _said(first: Collection[Stored], path: Path) -> dict[str, str]:

@@ -9,9 +9,8 @@ import math
 import os
 from array import array
 from collections import Counter
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
@@ -56,20 +55,22 @@ def _recording(opened: Opened) -> Recording:
     """All that is in a bag."""
     scene, reader, changes, timing = opened.scene, Ticks(opened), Changes(), list[Sequence[float]]()
     quality = () if opened.running.lockstep else timing_names(NAMES[body] for body in scene.system.laws)
-    held = {topic: array("d") for topic in opened.held}
-    takers: dict[Topic, Callable[[Stored], object]] = {
-        **{topic: partial(changes.add, topic, scene) for topic in topics.CHANGES.values()},
-        topics.TIMING: lambda stored: timing.extend(_of_a_plant(quality, stored)),
-        **{topic: partial(_check_text, opened, topic) for topic in (topics.SCENE, topics.RUN)},
-        **{topic: partial(_take_command, forces, topic, reader) for topic, forces in held.items()},
-    }
+    held, own = {topic: array("d") for topic in opened.held}, opened.storage.records[OWN_RECORD]
     counts = Counter(dict.fromkeys(opened.names, 0))
     stamps, rows = array("q"), array("d")
     for time_ns, tick, beside in ticks_of(opened, reader.topics):
         counts.update([*tick, *(topic for topic, _ in beside)])
         for topic, stored in beside:
-            if topic in takers:
-                takers[topic](stored)
+            if topic in topics.CHANGES.values():
+                changes.add(topic, scene, stored)
+            elif topic == topics.TIMING:
+                timing.extend(_of_a_plant(quality, stored))
+            elif topic in held:  # a command of a free run, which belongs to no tick
+                held[topic].append(reader.numbers(topic, stored.cdr)[-1])
+                if not abs(held[topic][-1]) <= LARGEST:
+                    raise BagError(f"{stored.topic}: {NOT_FINITE}")
+            elif topic in (topics.SCENE, topics.RUN) and decode(topic, stored.cdr).data != own[topic.name]:
+                raise BagError(f"{opened.path}: {stored.topic}: another {topic.name} than in the bag's own record")
         row = reader.row(time_ns, tick) if tick else []
         if topics.JOINT_STATES in tick:
             stamps.extend((time_ns, reader.stamp_ns))
@@ -116,20 +117,6 @@ def ticks_of(
         else:
             beside.append((topic, stored))
     yield time_ns, tick, beside
-
-
-def _take_command(forces: array[float], topic: Topic, reader: Ticks, stored: Stored) -> None:
-    """Take a command of a free run, which belongs to no tick."""
-    force = reader.numbers(topic, stored.cdr)[-1]
-    if not abs(force) <= LARGEST:
-        raise BagError(f"{stored.topic}: {NOT_FINITE}")
-    forces.append(force)
-
-
-def _check_text(opened: Opened, topic: Topic, stored: Stored) -> None:
-    """Refuse another scene, or another run, than that of the bag."""
-    if decode(topic, stored.cdr).data != opened.storage.records[OWN_RECORD][topic.name]:
-        raise BagError(f"{opened.path}: {stored.topic}: another {topic.name} than in the bag's own record")
 
 
 def _check_metadata(path: Path, storage: Storage) -> None:

@@ -170,9 +170,7 @@ class Storage:
         elif opcode == Opcode.CHANNEL:
             channel = Channel.read(ReadDataStream(BytesIO(body)))
             self._channels[channel.id] = channel
-        else:
-            return False
-        return True
+        return opcode in (Opcode.SCHEMA, Opcode.CHANNEL)
 
     def _read_summary(self) -> None:
         """Take schemas and channels from an index, which repeats them: their chunk, the first, may be damaged."""
