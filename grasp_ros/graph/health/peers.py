@@ -105,16 +105,14 @@ class PeerNode(GraspNode):
         if not self._first_look:
             self._first_look = now
             self.heartbeats.own.ready = True
-        elif now - self._looked > STILL_SECONDS:  # this thread was busy: what others did meanwhile waits here
+        progress = self.progress()
+        if progress == self._before or now - self._looked > STILL_SECONDS:  # what others did may wait here
             self.sweep()
-        self._looked = now
+        self._before, self._looked = progress, now
         self._watchdog.seen()
         self.heard()
         if self.finished:
             return
-        if (progress := self.progress()) == self._before:
-            self.sweep()
-        self._before = progress
         if not self.begun:
             waited = now - max(self._first_look, self.heartbeats.prepared)
             self.concern = f"for {waited:.0f} s" if waited > self.patience else ""
