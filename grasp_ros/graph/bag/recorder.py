@@ -35,7 +35,7 @@ from grasp_ros.scene.files import writing
 from grasp_ros.scene.strict_yaml import dump
 from grasp_ros.scene.topics import CLOCK, RUN, SCENE, Topic
 
-PRIVATE = [f"_Writer__{name}" for name in ("chunk_builder", "statistics", "chunk_indices")]  # of a writer of MCAP
+PRIVATE = [f"_Writer__{name}" for name in ("chunk_builder", "statistics", "chunk_indices")]  # there is no door
 FLUSH_SECONDS = 0.1  # a kill loses what came after the last flush; flush and disk have as long again
 INDEX_BYTES = 256  # at most what the index holds of one chunk
 HEAD: struct.Struct = struct.Struct("<BQ")  # opcode and length of every record of MCAP
@@ -130,7 +130,7 @@ class Recorder:
             enable_data_crcs=True,
         )
         own: list[Any] = [getattr(self._writer, name, None) for name in PRIVATE]
-        if None in own:
+        if None in own or own[-1] != []:
             raise BagError(f"mcap {version('mcap')}: its writer is another one; allowed: mcap>=1.5,<1.7")
         self._chunk, self._statistics, _ = own
         setattr(self._writer, PRIVATE[-1], ChunkIndexes())
