@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from grasp_ros.cli.arguments import add_command, add_output, add_scene, whole
+from grasp_ros.cli.arguments import add_command, add_scene, named, whole
 from grasp_ros.cli.checks import load_scene, prepare
 from grasp_ros.physics.errors import Refused
 
@@ -56,7 +56,7 @@ def _asked(*names: str, **words: Any) -> Option:
 
 
 def _output(metavar: str, text: str, default: Path) -> Option:
-    return lambda sub: add_output(sub, metavar, f"{text} (default {default})", default)
+    return _asked("-o", "--output", type=named, default=default, metavar=metavar, help=f"{text} (default {default})")
 
 
 def _paper(options: Options) -> int:

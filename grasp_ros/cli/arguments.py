@@ -74,10 +74,9 @@ def named(word: str) -> Path:
     return Path(word)
 
 
-def add_output(sub: Options, metavar: str, text: str, default: Path | None = None,
-               kind: Callable[[str], Path] = named) -> None:
+def add_output(sub: Options, metavar: str, text: str, kind: Callable[[str], Path] = named) -> None:
     """A file or a directory to write."""
-    sub.add_argument("-o", "--output", type=kind, default=default, metavar=metavar, help=text)
+    sub.add_argument("-o", "--output", type=kind, metavar=metavar, help=text)
 
 
 def add_file(sub: Options, metavar: str, text: str) -> None:

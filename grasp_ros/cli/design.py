@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import math
 from collections.abc import Sequence
 from typing import Any
+
+import numpy as np
 
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_file, add_json, add_scene, named, whole
 from grasp_ros.cli.checks import check_output, load_scene, prepare
@@ -15,7 +16,7 @@ from grasp_ros.scene.files import YAML
 from grasp_ros.simulation.outcomes import GROUPS
 
 END = "  an end of its range: a wider one may have a better choice"
-NEAR = 1e-6  # of a range
+INSIDE = np.array([1e-6, 1.0 - 1e-6])  # the part of a range that is not its ends
 RANGE = "section.key[+section.key]=low:high[::log]"
 
 
@@ -77,7 +78,8 @@ def _table(problem: Any, found: Sequence[Any]) -> list[str]:
     units = {name: "" if unit == "1" else f" {unit}" for name, unit in problem.units.items()}
     if len(found) == 1:
         numbers = found[0].numbers
-        ends = {key for axis in problem.axes for key in axis.keys if _is_end(axis, numbers[key])}
+        ends = {key for axis in problem.axes for low, high in [axis.at(INSIDE)] for key in axis.keys
+                if not low < numbers[key] < high}
         rows = [*((key, f"{value:.10g}{END if key in ends else ''}") for key, value in numbers.items()),
                 *((name, f"{value:.10g}{units[name]}") for name, value in found[0].outcomes.items()),
                 ("simulations", str(found[0].runs))]
@@ -88,9 +90,3 @@ def _table(problem: Any, found: Sequence[Any]) -> list[str]:
               *(f"{own.numbers[axis.keys[0]]:.8g}" for axis in problem.axes)] for own in found]
     widths = [max(map(len, column)) for column in zip(heads, *lines, strict=True)]
     return ["  ".join(f"{cell:>{width}}" for cell, width in zip(line, widths, strict=True)) for line in [heads, *lines]]
-
-
-def _is_end(axis: Any, value: float) -> bool:
-    """Whether a value is at an end of its range."""
-    low, at, high = map(math.log if axis.log else float, (axis.low, value, axis.high))
-    return min(at - low, high - at) <= NEAR * (high - low)

@@ -22,10 +22,10 @@ from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
 from grasp_ros.graph.bag import BagError, EmptyBagError
 from grasp_ros.graph.host import check_reach, hold, network
 from grasp_ros.graph.parameters import PEER_SECONDS, quoted
-from grasp_ros.graph.processes import Graph, GraphError, become
+from grasp_ros.graph.processes import Graph, become
 from grasp_ros.graph.running import Running, check_factor
 from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals, on_signals
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Failed, Refused
 from grasp_ros.scene.topics import JOINT_STATES
 
 
@@ -126,10 +126,10 @@ def _run(options: argparse.Namespace) -> int:
     try:
         stopped = _live(graph, spent)
         if stopped and graph.bag.exists() and not (graph.bag / "metadata.yaml").exists():
-            raise GraphError(f"{graph.bag}: was not closed")  # the monitor has said why, or was killed
+            raise Failed(f"{graph.bag}: was not closed")  # the monitor has said why, or was killed
         if not stopped or _has_ticks(graph.bag):
             return _report(graph, stopped, spent, options)
-    except (GraphError, BagError) as error:
+    except (Failed, BagError) as error:
         there = f"; {graph.bag} has what was recorded" if _has_ticks(graph.bag) else ""
         print(f"grasp: {error}{there}", file=sys.stderr)
         return 1

@@ -19,7 +19,7 @@ from typing import NoReturn
 from grasp_ros.graph.host import hold, remove_left
 from grasp_ros.graph.parameters import PEER_SECONDS, START_SECONDS, check_timeouts, quoted
 from grasp_ros.graph.stopping import GRACE_SECONDS, STOP_SIGNALS
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Failed, Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
 
@@ -46,10 +46,6 @@ def _command(nodes: Sequence[str], parameters: Mapping[str, str], namespace: str
     names = ["-r", f"__ns:={namespace}", "-r", f"/clock:={root}/clock"] if root else []
     # -P: a checkout in the working directory must not take the place of the package that is running.
     return [sys.executable, "-P", "-m", "grasp_ros.graph", *nodes, "--ros-args", *words, *names]
-
-
-class GraphError(RuntimeError):
-    """A process of the graph failed: names it and its exit status."""
 
 
 @dataclass
@@ -158,7 +154,7 @@ class Graph:
 
         Raises
         ------
-        GraphError
+        Failed
             If a process ends with another status than 0, a controller ends early, or plant and monitor do not end
             together.
         Refused
@@ -170,7 +166,7 @@ class Graph:
             if len(running) < len(awaited):
                 deadline = min(deadline, time.monotonic() + TOGETHER_SECONDS)
             if time.monotonic() > deadline:
-                raise GraphError(f"{running[0]}: still runs although its counterpart has ended")
+                raise Failed(f"{running[0]}: still runs although its counterpart has ended")
             self._check()
             if self.begun is None and self.bag.exists():
                 self.begun = time.monotonic()
@@ -180,9 +176,9 @@ class Graph:
         if not received:
             self._check()
             if self.begun is not None and not self.bag.exists():
-                raise GraphError(f"{self.bag}: was moved or removed")
+                raise Failed(f"{self.bag}: was moved or removed")
             if not (self.bag / "metadata.yaml").exists():  # a law can end its process, and all nodes with it
-                raise GraphError(f"{awaited[0]}: ended with exit status 0 before the run was over")
+                raise Failed(f"{awaited[0]}: ended with exit status 0 before the run was over")
 
     def _set_priorities(self) -> None:
         """Let a free run have its turn at once: between equals on busy processors it comes some milliseconds later.
@@ -215,10 +211,10 @@ class Graph:
                 self._causes.append((time.monotonic(), f"{name}: {why}", 1))
         if ended and self._causes:
             _, why, status = min(self._causes)
-            raise (Refused if status == 2 else GraphError)(why)
+            raise (Refused if status == 2 else Failed)(why)
         for name, status in ended.items():
             if status or name.endswith("controller"):
-                raise GraphError(f"{name}: ended with exit status {status} before the run was over")
+                raise Failed(f"{name}: ended with exit status {status} before the run was over")
         for name, process in self.processes.items():
             self._see_whether_stopped(name, process)
 
@@ -229,7 +225,7 @@ class Graph:
                 self._stopped[name] = math.inf if found.si_code == os.CLD_CONTINUED else time.monotonic()
         patience = self.peer_timeout + (0.0 if self.one_process else NODES_SECONDS)
         if self.on_silence == "end" and time.monotonic() - self._stopped.get(name, math.inf) > patience:
-            raise GraphError(f"{name}: was suspended for more than {patience:g} s")
+            raise Failed(f"{name}: was suspended for more than {patience:g} s")
 
     def stop(self) -> dict[str, int]:
         """Interrupt what still runs, wait for it, and return the exit statuses."""

@@ -14,7 +14,6 @@ from typing import Any
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.topics import CLOCK, FORCE, FRAME, LYAPUNOV, LYAPUNOV_NAMES, Topic
 
-Command = tuple[int, float]  # time in ns of the state that it answers, force in N
 SHORTEST, MOST_BYTES = 16, 4096  # of a message that comes with every state
 _HEAD = b"\0\1\0\0"  # CDR, little endian; what follows is aligned from its end on
 _STAMP, _LENGTH, _NUMBER = struct.Struct("<iI"), struct.Struct("<I"), struct.Struct("<d")
@@ -120,7 +119,7 @@ def raw_force(cdr: bytes) -> float:
     return float(force)
 
 
-def raw_command(cdr: bytes) -> Command | None:
+def raw_command(cdr: bytes) -> tuple[int, float] | None:
     """Time in ns and force in N of a serialized WrenchStamped; None if a plant cannot take it, or a bag not hold it."""
     if not SHORTEST <= len(cdr) <= MOST_BYTES:
         return None

@@ -26,7 +26,7 @@ from sensor_msgs.msg import JointState
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
-from grasp_ros.graph.bag.chunks import HEAD
+from grasp_ros.graph.bag.recorder import HEAD
 from grasp_ros.graph.bag.verify import laws_of, verify
 from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.ros import messages

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import AbstractContextManager
 from heapq import merge
 from itertools import chain, islice, pairwise
@@ -78,35 +78,31 @@ class Opened:
             self.running = runnings.parse(own["run"])
             self.versions = {key.removeprefix(VERSION): word for key, word in own.items() if key.startswith(VERSION)}
             self.names = names_of(self.scene, own)
-            known = {(name, topic.type): topic for topic, name in self.names.items()}
             everything: Iterable[Stored] = chain(first, messages)
-            if not self.storage.library.startswith(LIBRARY) and _jumps_back(path, salvage):
-                # Topics lie one behind the other, each in its order.
-                rows = defaultdict[str, list[Stored]](list)
-                for stored in everything:
-                    rows[stored.topic].append(stored)
-                everything = merge(*rows.values(), key=attrgetter("time_ns"))
+            if not self.storage.library.startswith(LIBRARY):
+                again = open_storage(path, salvage).messages()
+                if any(after.time_ns < before.time_ns for before, after in pairwise(again)):
+                    # Topics lie one behind the other, each in its order.
+                    rows = defaultdict[str, list[Stored]](list)
+                    for stored in everything:
+                        rows[stored.topic].append(stored)
+                    everything = merge(*rows.values(), key=attrgetter("time_ns"))
             self.foreign: Counter[str] = Counter()  # messages by topic that a bag which is salvaged leaves out
-            self.messages = self._known(known, everything, salvage)  # each with its topic
+            self.messages = self._known(everything)  # each with its topic
             # Topics whose messages are as they came, not one for each tick: those of commands in a free run.
             self.held: Collection[Topic] = () if self.running.lockstep else self.scene.controllers.values()
 
-    def _known(self, known: Mapping[tuple[str, str], Topic], messages: Iterable[Stored], salvage: bool
-               ) -> Iterator[tuple[Topic, Stored]]:
+    def _known(self, messages: Iterable[Stored]) -> Iterator[tuple[Topic, Stored]]:
+        known = {(name, topic.type): topic for topic, name in self.names.items()}
         with decoding_bag(self.path):
             for stored in messages:
                 if topic := known.get((stored.topic, stored.type)):
                     yield topic, stored
-                elif salvage:
+                elif self.salvage:
                     self.foreign[stored.topic] += 1
                 else:
                     raise BagError(f"{self.path}: {stored.topic}: {stored.type} is not a topic of its scene;"
                                    " `grasp recover` leaves it out")
-
-
-def _jumps_back(path: Path, salvage: bool) -> bool:
-    """Whether the messages of a file are in another order than that of their times."""
-    return any(after.time_ns < before.time_ns for before, after in pairwise(open_storage(path, salvage).messages()))
 
 
 def _said(first: Collection[Stored], path: Path) -> dict[str, str]:

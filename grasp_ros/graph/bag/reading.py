@@ -9,9 +9,8 @@ import math
 import os
 from array import array
 from collections import Counter
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
@@ -28,23 +27,10 @@ from grasp_ros.graph.serialization import template_of
 from grasp_ros.physics import given
 from grasp_ros.physics.layout import OBJECT
 from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.scene import topics
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import read_text
-from grasp_ros.scene.topics import (
-    CHANGES,
-    CLOCK,
-    COMMANDS,
-    FORCE,
-    JOINT_STATES,
-    LYAPUNOV,
-    LYAPUNOV_NAMES,
-    RUN,
-    SCENE,
-    TIMING,
-    Numbers,
-    Topic,
-    timing_names,
-)
+from grasp_ros.scene.topics import Numbers, Topic, timing_names
 
 MOST_NS = 2**63 - 1
 LARGEST = 1e100  # of a number: its square is one, too
@@ -69,22 +55,24 @@ def _recording(opened: Opened) -> Recording:
     """All that is in a bag."""
     scene, reader, changes, timing = opened.scene, Ticks(opened), Changes(), list[Sequence[float]]()
     quality = () if opened.running.lockstep else timing_names(NAMES[body] for body in scene.system.laws)
-    held = {topic: array("d") for topic in opened.held}
-    takers: dict[Topic, Callable[[Stored], object]] = {
-        **{topic: partial(changes.add, topic, scene) for topic in CHANGES.values()},
-        TIMING: lambda stored: timing.extend(_of_a_plant(quality, stored)),
-        **{topic: partial(_check_text, opened, topic) for topic in (SCENE, RUN)},
-        **{topic: partial(_take_command, forces, topic, reader) for topic, forces in held.items()},
-    }
+    held, own = {topic: array("d") for topic in opened.held}, opened.storage.records[OWN_RECORD]
     counts = Counter(dict.fromkeys(opened.names, 0))
     stamps, rows = array("q"), array("d")
     for time_ns, tick, beside in ticks_of(opened, reader.topics):
         counts.update([*tick, *(topic for topic, _ in beside)])
         for topic, stored in beside:
-            if topic in takers:
-                takers[topic](stored)
+            if topic in topics.CHANGES.values():
+                changes.add(topic, scene, stored)
+            elif topic == topics.TIMING:
+                timing.extend(_of_a_plant(quality, stored))
+            elif topic in held:  # a command of a free run, which belongs to no tick
+                held[topic].append(reader.numbers(topic, stored.cdr)[-1])
+                if not abs(held[topic][-1]) <= LARGEST:
+                    raise BagError(f"{stored.topic}: {NOT_FINITE}")
+            elif topic in (topics.SCENE, topics.RUN) and decode(topic, stored.cdr).data != own[topic.name]:
+                raise BagError(f"{opened.path}: {stored.topic}: another {topic.name} than in the bag's own record")
         row = reader.row(time_ns, tick) if tick else []
-        if JOINT_STATES in tick:
+        if topics.JOINT_STATES in tick:
             stamps.extend((time_ns, reader.stamp_ns))
             rows.extend(row)
     if not stamps:
@@ -93,7 +81,7 @@ def _recording(opened: Opened) -> Recording:
     times = np.array(stamps).reshape(-1, 2)
     ends = np.cumsum([template.count for template in reader.topics.values()])[:-1]
     parts = dict(zip(reader.topics, np.split(np.array(rows).reshape(len(times), -1), ends, axis=1), strict=True))
-    ticks, (states, lyapunov) = times[:, 0] // scene.period_ns, (parts[topic] for topic in (JOINT_STATES, LYAPUNOV))
+    ticks, states, lyapunov = times[:, 0] // scene.period_ns, parts[topics.JOINT_STATES], parts[topics.LYAPUNOV]
     state, effort, command = np.full((len(ticks), 6), np.nan), *np.zeros((2, len(ticks), 2))
     for body, numbers in zip(scene.system.present, states.reshape(len(ticks), 3, -1).T, strict=True):
         state[:, COLUMN[body]], state[:, COLUMN[body] + 1] = numbers[:2]
@@ -106,12 +94,12 @@ def _recording(opened: Opened) -> Recording:
         effort, command, {output.topic.name: parts[output.topic][:, 0] for output in scene.outputs}, lyapunov,
         dict(changes), opened.running, ticks[times[:, 1] == 0], _lost(opened.storage),
         dict(zip(quality, np.array(timing).T, strict=True)) if timing else {}, dict(+changes.unheard),
-        {side: np.array(held[topic]) for side, topic in COMMANDS.items() if topic in held},
+        {side: np.array(held[topic]) for side, topic in topics.COMMANDS.items() if topic in held},
     )
 
 
 def ticks_of(
-    opened: Opened, topics: Container[Topic]
+    opened: Opened, wanted: Container[Topic]
 ) -> Iterator[tuple[int, dict[Topic, bytes], list[tuple[Topic, Stored]]]]:
     """Time in ns of each tick, its messages on these topics, and what lies beside them, in the order of the bag.
 
@@ -122,27 +110,13 @@ def ticks_of(
         if stored.time_ns != time_ns:
             yield time_ns, tick, beside
             time_ns, tick, beside = stored.time_ns, {}, []
-        if topic in topics:
+        if topic in wanted:
             if topic in tick and not opened.salvage:
                 raise BagError(f"{stored.topic}: {time_ns} ns; {IN_ORDER}")
             tick[topic] = stored.cdr
         else:
             beside.append((topic, stored))
     yield time_ns, tick, beside
-
-
-def _take_command(forces: array[float], topic: Topic, reader: Ticks, stored: Stored) -> None:
-    """Take a command of a free run, which belongs to no tick."""
-    force = reader.numbers(topic, stored.cdr)[-1]
-    if not abs(force) <= LARGEST:
-        raise BagError(f"{stored.topic}: {NOT_FINITE}")
-    forces.append(force)
-
-
-def _check_text(opened: Opened, topic: Topic, stored: Stored) -> None:
-    """Refuse another scene, or another run, than that of the bag."""
-    if decode(topic, stored.cdr).data != opened.storage.records[OWN_RECORD][topic.name]:
-        raise BagError(f"{opened.path}: {stored.topic}: another {topic.name} than in the bag's own record")
 
 
 def _check_metadata(path: Path, storage: Storage) -> None:
@@ -165,7 +139,7 @@ class Ticks:
         scene, self._full = opened.scene, opened.names
         self._period_ns, self._end_ns = scene.period_ns, scene.ticks * scene.period_ns
         self.names = [NAMES[body] for body in scene.system.present]
-        self._templates = {topic: template_of(topic, self.names) for topic in (CLOCK, *scene.topics)}
+        self._templates = {topic: template_of(topic, self.names) for topic in (topics.CLOCK, *scene.topics)}
         # In the order of a row.
         self.topics = {topic: own for topic, own in self._templates.items() if topic not in opened.held}
         self._time_ns, self.stamp_ns = 0, 0  # of the last tick; the first one counts from the begin of the scene
@@ -188,18 +162,18 @@ class Ticks:
                 continue
             found[topic] = numbers = template.read(cdr) or self._decoded(topic, cdr)
             row += numbers[2:]
-            if topic != LYAPUNOV and not sum(map(abs, numbers)) <= LARGEST:
+            if topic != topics.LYAPUNOV and not sum(map(abs, numbers)) <= LARGEST:
                 self._refuse(topic, time_ns, NOT_FINITE)
         self._before = time_ns
-        if states := found.get(JOINT_STATES):
+        if states := found.get(topics.JOINT_STATES):
             stamp_ns = int(states[0]) * NANOSECONDS + int(states[1])
             step, passed = stamp_ns - self.stamp_ns, time_ns - self._time_ns
             follows = step == passed or step <= 0 or passed > self._period_ns  # or it was reset, perhaps in a gap
             if stamp_ns % self._period_ns or not 0 <= stamp_ns <= self._end_ns or not follows:
-                self._refuse(JOINT_STATES, time_ns, "its stamp is not the next one of the scene")
+                self._refuse(topics.JOINT_STATES, time_ns, "its stamp is not the next one of the scene")
             efforts = zip(self.names, states[-len(self.names) :], strict=True)
             if any(effort for name, effort in efforts if name == NAMES[OBJECT]):
-                self._refuse(JOINT_STATES, time_ns, "an effort of the object; allowed: 0")
+                self._refuse(topics.JOINT_STATES, time_ns, "an effort of the object; allowed: 0")
             for topic, own in found.items():
                 if own[0] != states[0] or own[1] != states[1]:
                     self._refuse(topic, time_ns, "its stamp is not that of the state")
@@ -216,14 +190,14 @@ class Ticks:
     def _decoded(self, topic: Topic, cdr: bytes) -> list[float]:
         """Time and numbers of a message of another make, in the order of those of a recorder."""
         message, names, name = decode(topic, cdr), self.names, self._full[topic]
-        if topic == CLOCK:
+        if topic == topics.CLOCK:
             return [message.clock.sec, message.clock.nanosec]
-        if topic.type == FORCE:  # of a command nothing but its force is read, whoever sends it; others have no more
+        if topic.type == topics.FORCE:  # of a command only its force is read, whoever sends it; others have no more
             force, torque = message.wrench.force, message.wrench.torque
-            if topic not in COMMANDS.values() and any((force.y, force.z, torque.x, torque.y, torque.z)):
+            if topic not in topics.COMMANDS.values() and any((force.y, force.z, torque.x, torque.y, torque.z)):
                 raise BagError(f"{name}: a force or torque beside force.x; allowed: 0")
-        numbers = [force.x] if topic.type == FORCE else message.position
-        if topic == JOINT_STATES:
+        numbers = [force.x] if topic.type == topics.FORCE else message.position
+        if topic == topics.JOINT_STATES:
             lists = message.position, message.velocity, message.effort
             once = len({*message.name}) == len(message.name)
             if not (once and {*names} <= {*message.name} and all(len(row) == len(message.name) for row in lists)):
@@ -231,10 +205,10 @@ class Ticks:
             numbers = np.array(lists)[:, [message.name.index(name) for name in names]].ravel()
         if len(numbers) != self._templates[topic].count:
             raise BagError(f"{name}: {len(numbers)} numbers; allowed: {self._templates[topic].count}")
-        if topic == LYAPUNOV:
-            if sorted(message.name) != sorted(LYAPUNOV_NAMES):
-                raise BagError(f"{name}: {', '.join(message.name)}; allowed: {', '.join(LYAPUNOV_NAMES)}")
-            numbers = [numbers[message.name.index(name)] for name in LYAPUNOV_NAMES]
+        if topic == topics.LYAPUNOV:
+            if sorted(message.name) != sorted(topics.LYAPUNOV_NAMES):
+                raise BagError(f"{name}: {', '.join(message.name)}; allowed: {', '.join(topics.LYAPUNOV_NAMES)}")
+            numbers = [numbers[message.name.index(name)] for name in topics.LYAPUNOV_NAMES]
         return [message.header.stamp.sec, message.header.stamp.nanosec, *numbers]
 
 
@@ -243,7 +217,7 @@ class Changes(dict[int, dict[str, float]]):
 
     def __init__(self) -> None:
         self._now: dict[str, float] = {}
-        self._numbers = {topic: Numbers() for topic in CHANGES.values()}
+        self._numbers = {topic: Numbers() for topic in topics.CHANGES.values()}
         self.unheard: Counter[str] = Counter()
 
     def add(self, topic: Topic, scene: scenes.Scene, stored: Stored) -> None:
@@ -265,7 +239,7 @@ class Changes(dict[int, dict[str, float]]):
 def _of_a_plant(known: Sequence[str], stored: Stored) -> Iterator[Sequence[float]]:
     """The numbers of a message on `timing`, unless somebody else has sent it: anybody may."""
     with suppress(*UNREADABLE):
-        message = decode(TIMING, stored.cdr)
+        message = decode(topics.TIMING, stored.cdr)
         if [*known] == message.name and len(known) == len(message.position) and np.isfinite(message.position).all():
             yield message.position
 

@@ -11,17 +11,21 @@ import errno
 import hashlib
 import os
 import resource
+import struct
 import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import ChunkIndex, MessageIndex
 from mcap.writer import CompressionType, IndexType, Writer
 
 from grasp_ros.graph.bag import BagError, rosbag2
-from grasp_ros.graph.bag.chunks import Messages
 from grasp_ros.graph.bag.disk import CHUNK_BYTES, FULL, RESERVE_BYTES, Sink
 from grasp_ros.graph.running import Running
 from grasp_ros.graph.serialization import template_of
@@ -31,8 +35,11 @@ from grasp_ros.scene.files import writing
 from grasp_ros.scene.strict_yaml import dump
 from grasp_ros.scene.topics import CLOCK, RUN, SCENE, Topic
 
+PRIVATE = [f"_Writer__{name}" for name in ("chunk_builder", "statistics", "chunk_indices")]  # there is no door
 FLUSH_SECONDS = 0.1  # a kill loses what came after the last flush; flush and disk have as long again
 INDEX_BYTES = 256  # at most what the index holds of one chunk
+HEAD: struct.Struct = struct.Struct("<BQ")  # opcode and length of every record of MCAP
+MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # the same of a message, its channel, number and both times
 OWN_RECORD, LOST_RECORD = "grasp_ros", "grasp_ros/lost"
 LIBRARY = "grasp_ros-"  # how the name of what has written a bag begins
 # Counted in LOST_RECORD: all that is in the bag, and what came beside the states and was too much.
@@ -50,6 +57,25 @@ def signed(record: Mapping[str, str]) -> dict[str, str]:
     """A metadata record with its checksum: MCAP itself has none before the file is closed."""
     content = {key: value for key, value in record.items() if key != DIGEST}
     return {**content, DIGEST: checksum(repr(sorted(content.items())))}
+
+
+class ChunkIndexes:
+    """The indexes of all chunks, serialized already, in place of a writer's list: a day has a million chunks."""
+
+    def __init__(self) -> None:
+        self._serialized = RecordBuilder()
+
+    def append(self, index: ChunkIndex) -> None:
+        """Add one."""
+        index.write(self._serialized)
+
+    def __iter__(self) -> Iterator[ChunkIndexes]:
+        """All of them as one."""
+        yield self
+
+    def write(self, stream: RecordBuilder) -> None:
+        """Write all of them."""
+        stream.write(self._serialized.end())  # type: ignore[no-untyped-call]
 
 
 def check_path(path: Path) -> None:
@@ -94,8 +120,6 @@ class Recorder:
             path.mkdir(parents=True)
             self._sink = Sink(path / f"{path.name}.mcap", path / ".reserve")
             self._begin()
-        if self._error:
-            raise BagError(self._error)
         self._thread = threading.Thread(target=self._flush_regularly, name="recorder", daemon=True)
         self._thread.start()
 
@@ -105,7 +129,11 @@ class Recorder:
             self._sink, chunk_size=2**62, compression=CompressionType.ZSTD, index_types=IndexType.ALL,  # type: ignore[arg-type]
             enable_data_crcs=True,
         )
-        self._messages = Messages(self._writer)
+        own: list[Any] = [getattr(self._writer, name, None) for name in PRIVATE]
+        if None in own or own[-1] != []:
+            raise BagError(f"mcap {version('mcap')}: its writer is another one; allowed: mcap>=1.5,<1.7")
+        self._chunk, self._statistics, _ = own
+        setattr(self._writer, PRIVATE[-1], ChunkIndexes())
         self._writer.start(rosbag2.PROFILE, f"{LIBRARY}{version('grasp_ros')}")
         self._writer.add_metadata(OWN_RECORD, signed(self._custom))
         schemas = {
@@ -153,8 +181,6 @@ class Recorder:
             self._last_ns, self._next = time_ns, tick + 1
             if self._waiting > CHUNK_BYTES:
                 self._flush()
-        if self._error:
-            raise BagError(self._error)
 
     def write(self, topic: Topic, cdr: bytes) -> None:
         """Append what does not come with every tick, at the time of the last one; nothing once the bag is closed."""
@@ -163,11 +189,25 @@ class Recorder:
                 self._add(topic, self._last_ns, cdr)
 
     def _add(self, topic: Topic, time_ns: int, cdr: bytes) -> None:
-        self._messages.add(self._channels[topic], time_ns, cdr)
+        """Add a message, not earlier than the last: with the bytes of the library's way, in a third of its time."""
+        channel, chunk, statistics = self._channels[topic], self._chunk, self._statistics
+        number = statistics.channel_message_counts[channel]
+        if channel not in chunk.message_indices:
+            chunk.message_indices[channel] = MessageIndex(channel, [])
+        chunk.message_indices[channel].records.append((time_ns, chunk.count))
+        if not chunk.num_messages:
+            chunk.message_start_time = time_ns
+        chunk.message_end_time = statistics.message_end_time = time_ns
+        chunk.num_messages += 1
+        statistics.message_count += 1
+        statistics.channel_message_counts[channel] = number + 1
+        length = MESSAGE_HEAD.size - HEAD.size + len(cdr)
+        head = MESSAGE_HEAD.pack(Opcode.MESSAGE, length, channel, number, time_ns, time_ns)
+        chunk.record_writer.write(head + cdr)
         self._waiting += len(cdr)
 
     def _flush(self) -> None:
-        """End the chunk; close the bag while there is room for its end."""
+        """End the chunk; close the bag while there is room for its end, and say why."""
         if not self._waiting:
             return
         self._writer.flush()  # type: ignore[no-untyped-call]
@@ -188,6 +228,7 @@ class Recorder:
             self._error = (f"{self._path}: {until}: {why}; the bag is closed, and whole up to there" if self._next else
                            f"{self._path}: no tick could be recorded: {why}")
             self._finish(why, {})
+            raise BagError(self._error)
 
     def _flush_regularly(self) -> None:
         while not self._stop.wait(FLUSH_SECONDS):
@@ -195,8 +236,6 @@ class Recorder:
                 with writing(self._path, BagError):
                     with self._lock:
                         self._flush()
-                    if self._closed:
-                        return
                     self._see_whether_there()
                     os.fdatasync(self._sink.file)
             except BagError as error:  # for whoever writes or closes next
@@ -232,7 +271,6 @@ class Recorder:
             with writing(self._path, BagError):
                 if not self._closed:
                     self._flush()
-                if not self._closed:
                     self._finish("closed", {name: str(value) for name, value in (counters or {}).items()})
         finally:
             self._closed = True
@@ -244,7 +282,8 @@ class Recorder:
         """Write what was lost, the index, and the metadata."""
         self._closed = True
         self._sink.release()
-        counts = {topic: self._messages.counts.get(channel, 0) for topic, channel in self._channels.items()}
+        written = self._statistics.channel_message_counts
+        counts = {topic: written[channel] for topic, channel in self._channels.items()}
         document = rosbag2.metadata(f"{self._path.name}.mcap", counts, self._names, self._last_ns, self._custom)
         text = dump(document)
         lost = {"end": why, "ticks that are missing": self.gaps or "none", WRITTEN: str(sum(counts.values())),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
 from typing import Any
 
 from rosbags.typesys import Stores, get_typestore
@@ -40,7 +39,6 @@ def qos_profiles(topic: Topic) -> list[dict[str, Any]]:
     }]
 
 
-@cache
 def definition(kind: str) -> bytes:
     """Definition of a message type with all types that it uses."""
     return _TYPES.generate_msgdef(kind, ros_version=2)[0].encode()

@@ -22,8 +22,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Footer, Header, Metadata, Schema
 
 from grasp_ros.graph.bag import BagError
-from grasp_ros.graph.bag.chunks import HEAD
-from grasp_ros.graph.bag.recorder import DIGEST, LOST_RECORD, OWN_RECORD, signed
+from grasp_ros.graph.bag.recorder import DIGEST, HEAD, LOST_RECORD, OWN_RECORD, signed
 from grasp_ros.graph.bag.rosbag2 import PROFILE
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -83,8 +82,6 @@ class Storage:
         while offset < len(data):
             try:
                 end = self._end_of(offset)
-                if end is None:
-                    raise EOFError("the rest of a record is missing")
                 opcode, body = data[offset], data[offset + HEAD.size : end]
                 if opcode == Opcode.DATA_END:
                     self._check_end(offset, end)
@@ -111,15 +108,14 @@ class Storage:
         if end != offset + DATA_END_BYTES:
             self._refuse("the end of its data is not as long as it should be")
 
-    def _end_of(self, offset: int) -> int | None:
-        """Where a record ends; None if it is not all there. A longer one than any of a bag is an AnotherMakeError."""
-        if offset + HEAD.size > len(self._data):
-            return None
-        _, length = HEAD.unpack_from(self._data, offset)
-        end = int(offset + HEAD.size + length)
+    def _end_of(self, offset: int) -> int:
+        """Where a record ends, if it is all there. A longer one than any of a bag is an AnotherMakeError."""
+        begin = end = offset + HEAD.size
+        if begin <= len(self._data):
+            end += HEAD.unpack_from(self._data, offset)[1]
         if end > len(self._data):
-            return None
-        if length > RECORD_BYTES:
+            raise EOFError("the rest of a record is missing")
+        if (length := end - begin) > RECORD_BYTES:
             raise AnotherMakeError(f"a record of {length} bytes; allowed: at most {RECORD_BYTES}")
         return end
 
@@ -174,9 +170,7 @@ class Storage:
         elif opcode == Opcode.CHANNEL:
             channel = Channel.read(ReadDataStream(BytesIO(body)))
             self._channels[channel.id] = channel
-        else:
-            return False
-        return True
+        return opcode in (Opcode.SCHEMA, Opcode.CHANNEL)
 
     def _read_summary(self) -> None:
         """Take schemas and channels from an index, which repeats them: their chunk, the first, may be damaged."""
@@ -186,7 +180,8 @@ class Storage:
             summary = memoryview(self._data)[offset : -len(MAGIC) - SUM.size]
             if not offset or (footer.summary_crc and zlib.crc32(summary) != footer.summary_crc):
                 return
-            while (end := self._end_of(offset)) is not None:
+            while True:  # to the end of the file
+                end = self._end_of(offset)
                 self._defines(self._data[offset], self._data[offset + HEAD.size : end])
                 offset = end
 
@@ -209,7 +204,7 @@ class Storage:
             offset = mark - CHUNK_MARK_AT
             with suppress(*DAMAGE):
                 end = self._end_of(offset)
-                if end is not None and self._data[offset] == Opcode.CHUNK:
+                if self._data[offset] == Opcode.CHUNK:
                     unpack(self._data[offset + HEAD.size : end])
                     return offset
             offset += 1

@@ -6,7 +6,6 @@ import math
 import time
 from abc import abstractmethod
 from collections.abc import Callable, Iterator
-from enum import Enum
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -25,22 +24,18 @@ SLOW = 4  # times longer who shows that it lives may take
 MOST_TEXTS = 8  # of a topic, that wait for somebody to vouch for them
 
 
-class Gone(Enum):
-    """What a node does when nobody publishes a topic any more."""
-
-    ENDS = "ends"
-    AS_TOLD = "ends or keeps waiting, as on_silence says"
-    STAYS = "waits for the next one"
-
-
 class Need(NamedTuple):
-    """A topic that somebody has to publish."""
+    """A topic that somebody has to publish.
+
+    If nobody does any more, a node that `stays` waits for the next one; others end, or do as on_silence says where
+    somebody else may take over.
+    """
 
     topic: Topic
-    gone: Gone
     what: str = ""  # is due
     due: float = math.inf  # since this wall time
     first: bool = False  # whether it would be the first
+    replaceable: bool = False  # whether somebody else may take over
 
 
 class Trouble(NamedTuple):
@@ -75,7 +70,7 @@ class PeerNode(GraspNode):
             self.get_name(), self.patience, self.standing, self._ends, lambda: self.heartbeats.frozen()
         )
         self.heartbeats = Heartbeats(self, self.heard, self._watchdog.beat)
-        self._looked = self._excused = time.monotonic()
+        self._looked = time.monotonic()
         self._first_look = 0.0  # wall time of the first look: all that may take long is done
         self._before: object = None  # progress at the last look
         self.wall_timer(LOOK_SECONDS, self.look)
@@ -104,23 +99,20 @@ class PeerNode(GraspNode):
         if self._watchdog.stopped:  # its thread looks first
             return
         now = time.monotonic()
-        if self._watchdog.resumed > self._excused:
-            self._excused = self._watchdog.resumed
-            if self.begun and not self.finished:
-                self.get_logger().warning(f"this node was suspended for {self._watchdog.stood:.1f} s")
+        stood, self._watchdog.stood = self._watchdog.stood, 0.0
+        if stood and self.begun and not self.finished:
+            self.get_logger().warning(f"this node was suspended for {stood:.1f} s")
         if not self._first_look:
             self._first_look = now
             self.heartbeats.own.ready = True
-        elif now - self._looked > STILL_SECONDS:  # this thread was busy: what others did meanwhile waits here
+        progress = self.progress()
+        if progress == self._before or now - self._looked > STILL_SECONDS:  # what others did may wait here
             self.sweep()
-        self._looked = now
+        self._before, self._looked = progress, now
         self._watchdog.seen()
         self.heard()
         if self.finished:
             return
-        if (progress := self.progress()) == self._before:
-            self.sweep()
-        self._before = progress
         if not self.begun:
             waited = now - max(self._first_look, self.heartbeats.prepared)
             self.concern = f"for {waited:.0f} s" if waited > self.patience else ""
@@ -147,23 +139,20 @@ class PeerNode(GraspNode):
             return Trouble(words + "".join(f": {why}" for why in said[-1:] if why != ENDED), True)
         self._gone.pop(need.topic, None)
         self._last[need.topic] = names
-        patience, quiet = self.patience, self._quiet(names, now - self.patience)
-        if any(beat.runs for beat in self.heartbeats.of(quiet)):  # on this machine, and busy or without its turn
-            patience *= SLOW
-            quiet = self._quiet(names, now - patience)
+        for patience in (self.patience, SLOW * self.patience):
+            there = self._watchdog.resumed < now - patience  # this process itself, all the while
+            quiet = self.heartbeats.quiet(names, now - patience) if there else []
+            if not any(beat.runs for beat in self.heartbeats.of(quiet)):  # on this machine, busy or without its turn
+                break
         if quiet:
             return Trouble(f"{need.topic.name}: no heartbeat of {' and '.join(quiet)} for {patience:g} s", True)
-        late = now - max(need.due, self._excused)
+        late = now - max(need.due, self._watchdog.resumed)
         if late > self.patience:
             living = bool(self.heartbeats.of(names))  # it may be slow, or compile for its first answer
             limit = (self.start_patience if need.first else SLOW * self.patience) if living else self.patience
             words = f"{need.topic.name}: no {need.what} of {' and '.join(names)} for {min(late, limit):.1f} s"
             return Trouble(f"{words}, only heartbeats" if living else words, late > limit)
         return None
-
-    def _quiet(self, names: list[str], limit: float) -> list[str]:
-        """Which nodes have sent no heartbeat since a wall time, if this process itself was there meanwhile."""
-        return self.heartbeats.quiet(names, limit) if self._excused < limit else []
 
     def _note(self, need: Need, trouble: Trouble | None, now: float) -> None:
         """React to what is wrong with a topic, or to its end."""
@@ -173,17 +162,17 @@ class PeerNode(GraspNode):
             if since is not None and not gone:
                 del self._silent[name]
                 self.get_logger().warning(f"{name}: is back after {now - since:.1f} s")
-            if need.gone is Gone.STAYS and not gone:  # it is there, or another one in its place
+            if self.stays and not gone:  # it is there, or another one in its place
                 if self._left is not None and self.phase is Phase.IDLE:
                     self.phase, self.words = self._left
                 self._left = None
-        elif gone and need.gone is Gone.STAYS:
+        elif gone and self.stays:
             self._silent.clear()
             if self._left is None:
                 self._left = self.phase, self.words
                 self.phase, self.words = Phase.IDLE, f"{trouble.words}; waiting for another one"
                 self.get_logger().info(self.words)
-        elif (gone and need.gone is Gone.ENDS) or (self._ends and trouble.certain):
+        elif (gone and not need.replaceable) or (self._ends and trouble.certain):
             self.fail(trouble.words)
         elif since is None or now - self._said > PATIENCE_SECONDS:
             if since is None:

@@ -36,7 +36,8 @@ class Watchdog:
     ) -> None:
         self._name, self._patience, self._standing, self._ends = name, patience, standing, ends
         self._frozen, self._beaten = frozen, time.monotonic()
-        self.resumed, self.stood = self._beaten, 0.0  # when it last went on after a stop of its own, which took so long
+        self.resumed = self._beaten  # when it last went on after a stop of its own
+        self.stood = 0.0  # how long that took, s, until the node has said it
         self.seen()
 
     def seen(self) -> None:

@@ -82,10 +82,6 @@ class Sources:
             self._until = now + self._seconds
         return now >= self._until
 
-    def alone(self) -> bool:
-        """Whether there is one, the same for a while."""
-        return self.settled() and self.now < 2
-
     def _look(self) -> None:
         with self._matches:
             status = self._matches.take_event()

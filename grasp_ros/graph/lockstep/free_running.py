@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from grasp_ros.graph.health.peers import Gone, Need
+from grasp_ros.graph.health.peers import Need
 from grasp_ros.graph.lockstep.admission import Limits
 from grasp_ros.graph.lockstep.steering import Steering
 from grasp_ros.graph.running import Running
@@ -86,10 +86,10 @@ class FreeRunning:
         if self._awaits:
             for topic, held in zip(self._plant.scene.controllers.values(), self._held.values(), strict=True):
                 due = math.inf if held.ever else self._plant.asked
-                yield Need(topic, Gone.AS_TOLD, what="first command", due=due, first=True)
+                yield Need(topic, "first command", due, first=True, replaceable=True)
         if self._plant.monitored:
             due = self._plant.asked if self._awaits and self.answered else math.inf
-            yield Need(LYAPUNOV, Gone.ENDS, what="sign of having had a command of each side", due=due, first=True)
+            yield Need(LYAPUNOV, "sign of having had a command of each side", due, first=True)
 
     def ask_again(self, now: float) -> None:
         """Publish the first state again while it waits for an answer; then the wall clock goes on."""

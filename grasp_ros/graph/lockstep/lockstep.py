@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from grasp_ros.graph.health.peers import Gone, Need
+from grasp_ros.graph.health.peers import Need
 from grasp_ros.graph.lockstep.admission import Limits, Sources
 from grasp_ros.graph.lockstep.steering import Steering
 from grasp_ros.graph.ros.node import NEW
@@ -74,10 +74,10 @@ class Lockstep:
         what = f"answer{' that is allowed' if refused else ''} to tick {plant.tick}"
         for topic, side in zip(self.topics, plant.scene.system.laws, strict=True):
             due = math.inf if side in self._commands or topic in self._unsettled else plant.asked
-            yield Need(topic, Gone.AS_TOLD, what=what, due=due, first=not self.answered)
+            yield Need(topic, what, due, first=not self.answered, replaceable=True)
         if plant.monitored:
             due = max(plant.asked, plant.heard_of_record) if self._complete and self._ahead else math.inf
-            yield Need(LYAPUNOV, Gone.ENDS, what=what, due=due)
+            yield Need(LYAPUNOV, what, due)
 
     def ask_again(self, now: float) -> None:
         """Publish the current state again if nothing has come of it for a while: it, or an answer, was lost."""

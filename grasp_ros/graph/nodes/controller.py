@@ -12,7 +12,7 @@ from rclpy.parameter import Parameter
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
-from grasp_ros.graph.health.peers import Gone, Need, PeerNode
+from grasp_ros.graph.health.peers import Need, PeerNode
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.messages import State, StateReader
 from grasp_ros.graph.ros.node import Phase
@@ -59,7 +59,6 @@ class Controller(PeerNode):
         self._force = 0.0  # that answer
         self._number = 0  # of the last announcement for this scene
         self._ready_to_answer = False
-        self._reader = StateReader(())  # before a scene
         self.counters.update({"answered states": 0, "repeated states": 0, "refused states": 0, "skipped states": 0})
         self.add_on_set_parameters_callback(self._check)
         self.add_post_set_parameters_callback(self._stage)
@@ -70,7 +69,7 @@ class Controller(PeerNode):
 
     def needs(self) -> Iterator[Need]:
         """The plant; a monitor is the plant's need."""
-        yield Need(JOINT_STATES, Gone.STAYS)
+        yield Need(JOINT_STATES)
 
     def progress(self) -> object:
         """The last state answered."""
@@ -105,7 +104,7 @@ class Controller(PeerNode):
         self._staged = self.declare_scene(scene, name)
         scene.changed(self._staged)  # refuses what was given at the start and cannot be run
         if self._own:
-            self._own.check(scene.system, SIDES[self._side])
+            check(self._own.asks, scene.system, SIDES[self._side], f"law: {self._own.words}")
             self._check_own(self._staged)
         self._reader = StateReader([NAMES[body] for body in scene.system.present] if self._own else (self._side,))
         self._scene, self._answered, self.concern, self._number = scene, -1, "", 0
@@ -239,10 +238,6 @@ class OwnLaw:
         """Begin anew, without memory."""
         self._law = begin(self._found, f"law: {self.words}")
         self.asks = asked(self._law)
-
-    def check(self, system: System, side: int) -> None:
-        """Refuse a scene that does not have what the law asks for."""
-        check(self.asks, system, side, f"law: {self.words}")
 
     def command(self, system: System, side: int, tick: int, time: float, state: Sequence[float]) -> float:
         """Command in N that answers the state (6,) of a tick, through the stages of the scene."""

@@ -17,8 +17,9 @@ from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
 from grasp_ros.graph.bag import BagError
 from grasp_ros.graph.bag.recorder import NOT_RECORDED, Recorder, check_path
+from grasp_ros.graph.bag.rosbag2 import topics_of
 from grasp_ros.graph.health.heartbeat import digest
-from grasp_ros.graph.health.peers import Gone, Need, PeerNode
+from grasp_ros.graph.health.peers import Need, PeerNode
 from grasp_ros.graph.lockstep.admission import Limits, Sources
 from grasp_ros.graph.lockstep.synchronizer import UNCERTAIN_SECONDS, Arrival, Synchronizer, Tick
 from grasp_ros.graph.nodes.lyapunov_monitor import MOST_BYTES, LyapunovMonitor
@@ -28,22 +29,9 @@ from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.running import Running
 from grasp_ros.graph.serialization import template_of
 from grasp_ros.physics.system import NAMES
-from grasp_ros.scene import Scene
+from grasp_ros.scene import Scene, topics
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.topics import (
-    CHANGES,
-    CLOCK,
-    COMMANDS,
-    DEPTH,
-    DIAGNOSTICS,
-    JOINT_STATES,
-    LYAPUNOV,
-    RUN,
-    SCENE,
-    TIMING,
-    Topic,
-    named,
-)
+from grasp_ros.scene.topics import Topic, named
 from grasp_ros.scene.versions import versions
 
 MOST_TICKS, MOST_SECONDS = 128, 0.05  # that are evaluated at once, and of wall time that a tick waits for others
@@ -66,7 +54,6 @@ class Monitor(PeerNode):
         check_path(self._path)  # now, and not when a plant comes
         self._running: Running | None = None
         self._scene: Scene | None = None
-        self._recorder: Recorder | None = None
         self._due: list[tuple[int, Tick, list[tuple[Topic, bytes]]]] = []  # time in the bag, tick, what comes beside
         self._others: list[Subscription] = []  # of what does not come with every state
         self._published, self._advanced = b"", 0.0  # for the last tick, and the wall time at which it came
@@ -80,13 +67,13 @@ class Monitor(PeerNode):
             "alarms": 0, "ticks without V": 0, NOT_RECORDED: 0, DIAGNOSTICS_LEFT_OUT: 0, "restored commands": 0,
             **{arrival.value: 0 for arrival in Arrival if arrival is not Arrival.TAKEN},
         })
-        self._output, self._template = self.publisher(LYAPUNOV), template_of(LYAPUNOV)
-        self.on_text(RUN, self._on_run)
-        self.on_text(SCENE, self._on_scene)
+        self._output, self._template = self.publisher(topics.LYAPUNOV), template_of(topics.LYAPUNOV)
+        self.on_text(topics.RUN, self._on_run)
+        self.on_text(topics.SCENE, self._on_scene)
 
     def needs(self) -> Iterator[Need]:
         """The plant; controllers are the plant's need."""
-        yield Need(JOINT_STATES, Gone.ENDS)
+        yield Need(topics.JOINT_STATES)
 
     def progress(self) -> object:
         """The ticks so far."""
@@ -95,10 +82,10 @@ class Monitor(PeerNode):
     def look(self) -> None:
         """See to it that everybody is there; go on without what does not come."""
         if self.progress() != self._before:  # it is behind: a plant that has ended is missed when all is recorded
-            self._gone.pop(JOINT_STATES, None)
+            self._gone.pop(topics.JOINT_STATES, None)
         super().look()
-        if self._recorder is not None:
-            self._drain(time.monotonic() - max(self._advanced, self._excused))
+        if self.begun:
+            self._drain(time.monotonic() - max(self._advanced, self._watchdog.resumed))
 
     def heard(self) -> None:
         """Somebody has given a sign of life; if it is another plant in the place of the one that is recorded, end.
@@ -108,11 +95,11 @@ class Monitor(PeerNode):
         super().heard()
         self.finished = self.finished or self._is_over()
         if self._plant and not self.finished and (other := self.heartbeats.successor(self._plant)):
-            self.fail(f"{JOINT_STATES.name}: another {other} has replaced the recorded one")
+            self.fail(f"{topics.JOINT_STATES.name}: another {other} has replaced the recorded one")
 
     def fail(self, reason: str, status: int = 1) -> None:
         """End with a sentence that says how far the bag reaches."""
-        said = self._recorder is None or str(self._path) in reason  # by the recorder itself
+        said = not self.begun or str(self._path) in reason  # by the recorder itself
         ticks = "" if said else f"; the bag has {self.counters['ticks']} ticks"
         super().fail(f"{reason}{ticks}", status)
 
@@ -125,65 +112,64 @@ class Monitor(PeerNode):
         if self._scene is None:  # one run, one scene
             beat = self.heartbeats.vouched(digest(text))
             self._plant = beat.identity if beat else ""
-            self._scene = scenes.parse(text, SCENE.name, f"topic {SCENE.name}")
+            self._scene = scenes.parse(text, topics.SCENE.name, f"topic {topics.SCENE.name}")
             self._begin()
 
     def _begin(self) -> None:
         """Record, once it is known what runs and how."""
         if (scene := self._scene) is None or (running := self._running) is None:
             return
-        beside = [] if running.lockstep else [TIMING, *scene.controllers.values()]
-        self._awaited = {topic.name for topic in beside} - {TIMING.name}
-        per_tick = [topic for topic in scene.topics if topic != LYAPUNOV and topic not in beside]
+        beside = [] if running.lockstep else [topics.TIMING, *scene.controllers.values()]
+        self._awaited = {topic.name for topic in beside} - {topics.TIMING.name}
+        per_tick = [topic for topic in scene.topics if topic != topics.LYAPUNOV and topic not in beside]
         self._lyapunov, self._picture = LyapunovMonitor(scene), Picture(self, scene)
         self._synchronizer = Synchronizer(
-            [topic for topic in per_tick if topic != JOINT_STATES], [NAMES[body] for body in scene.system.present],
+            [topic for topic in per_tick if topic != topics.JOINT_STATES],
+            [NAMES[body] for body in scene.system.present],
             scene.period_ns, scene.ticks * scene.period_ns, scene.system.delay,
         )
         self._limits = Limits(self, scene)
-        topics = (RUN, SCENE, CLOCK, *scene.topics, *CHANGES.values(), TIMING)
-        names = {topic: self.resolve_topic_name(topic.name) for topic in topics}
+        names = {topic: self.resolve_topic_name(topic.name) for topic in topics_of(scene)}
         self._recorder = Recorder(self._path, scene, versions(), names, running)
         self._soon = self.wall_timer(MOST_SECONDS, self._complete)
         self._soon.cancel()
         self.begun, self.concern, self.phase = True, "", Phase.RUNNING
         self.words = f"recording {running.words}; {scene.certificate_in_words(sampled=True)}"
         self.get_logger().info(self.words)
-        self._laws = [self.subscribe(CHANGES[side], partial(self._on_announcement, side), raw=True)
-                      for side, command in COMMANDS.items() if command in scene.topics]
+        self._laws = [self.subscribe(topics.CHANGES[side], partial(self._on_announcement, side), raw=True)
+                      for side, command in topics.COMMANDS.items() if command in scene.topics]
         for topic in per_tick:
             subscription = self.subscribe(topic, partial(self._on_message, topic), raw=True)
-            if topic in COMMANDS.values():
+            if topic in topics.COMMANDS.values():
                 self._sources[topic] = Sources(subscription, UNCERTAIN_SECONDS)
-        for topic in (*beside, DIAGNOSTICS):
+        for topic in (*beside, topics.DIAGNOSTICS):
             self._others.append(self.subscribe(topic, partial(self._record, topic), raw=True))
 
     def _record(self, topic: Topic, cdr: bytes) -> None:
         """Keep what does not come with every state, at the time of the last one, as long as it is not too much."""
         self._beside[topic] += len(cdr)
-        assert self._recorder is not None
-        if topic in COMMANDS.values():
+        if topic in topics.COMMANDS.values():
             self.heartbeats.confirm(topic.name)
             self._let_wait()
         if len(cdr) > MOST_BYTES or self._beside[topic] > MOST_BESIDE_BYTES:
-            self.refuse(DIAGNOSTICS_LEFT_OUT if topic == DIAGNOSTICS else NOT_RECORDED, topic)
+            self.refuse(DIAGNOSTICS_LEFT_OUT if topic == topics.DIAGNOSTICS else NOT_RECORDED, topic)
         elif self._due:
             self._due[-1][2].append((topic, cdr))
         elif self.counters["ticks"]:
             self._recorder.write(topic, cdr)
-        elif topic != DIAGNOSTICS:
+        elif topic != topics.DIAGNOSTICS:
             self._early.append((topic, cdr))
 
     def _on_announcement(self, side: str, cdr: bytes) -> None:
         try:
             self._lyapunov.announce(side, cdr)
         except messages.UNREADABLE as error:  # `Refused` is a ValueError
-            self.refuse("refused announcements", CHANGES[side], str(error))
+            self.refuse("refused announcements", topics.CHANGES[side], str(error))
         self.counters["lost announcements"] = self._lyapunov.lost
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
         sources = self._sources.get(topic)  # of commands: is this one nobody else's?
-        sure = sources is None or (sources.alone() and self._limits.allow(topic, cdr))
+        sure = sources is None or (sources.settled() and sources.now < 2 and self._limits.allow(topic, cdr))
         arrival = self._synchronizer.put(topic, cdr, sure)
         if arrival is Arrival.TAKEN:
             self._drain()
@@ -219,7 +205,7 @@ class Monitor(PeerNode):
         self.count("restored commands", tick.restored)
         self.count("lost messages", tick.lost)
         self.count("messages without a state", tick.dropped)
-        beside = [*self._early, *((CHANGES[side], cdr) for side, cdr in self._lyapunov.begin(tick.time_ns))]
+        beside = [*self._early, *((topics.CHANGES[side], cdr) for side, cdr in self._lyapunov.begin(tick.time_ns))]
         self._early.clear()
         self._due.append((self._bag_ns, tick, beside))
         if len(self._due) >= MOST_TICKS or tick.time_ns == self._synchronizer.end_ns:
@@ -241,18 +227,17 @@ class Monitor(PeerNode):
         due, self._due = self._due, []
         if not due:
             return
-        assert self._recorder is not None
         self._soon.cancel()
         if self._lyapunov.unknown:  # what was announced while they waited
             self.take_waiting(self._laws)
         late = self._lyapunov.begin(due[0][1].time_ns)
-        due[0][2].extend((CHANGES[side], cdr) for side, cdr in late)
+        due[0][2].extend((topics.CHANGES[side], cdr) for side, cdr in late)
         rows = self._lyapunov.evaluate([tick for _, tick, _ in due])
         for (bag_ns, tick, beside), values in zip(due, rows, strict=True):
             self.count("ticks")
             self._picture.show(tick.state)
             own = self._published = self._template.fill(tick.time_ns, values)
-            self._recorder.write_tick(bag_ns, [*beside, *tick.found.items(), (LYAPUNOV, own)], tick.time_ns)
+            self._recorder.write_tick(bag_ns, [*beside, *tick.found.items(), (topics.LYAPUNOV, own)], tick.time_ns)
             self._output.publish(own)
             self._heed(tick, named(values))
             self._at_end = tick.time_ns == self._synchronizer.end_ns
@@ -289,10 +274,10 @@ class Monitor(PeerNode):
 
     def close(self) -> None:
         """Close the bag; then let the plant have the last value."""
-        if self._recorder is not None:
+        if self.begun:
             with suppress(*[BagError] if self.exit_code else []):  # it has been said
                 self._take_what_came()
-                self.take_waiting(self._others, DEPTH)  # what came with the last states: it may have been behind
+                self.take_waiting(self._others, topics.DEPTH)  # what came with the last states: it may have been behind
                 self._recorder.close(self.counters)
                 self.get_logger().info(f"closed the bag {self._path}: {self.counters['ticks']} ticks")
         if self.finished:

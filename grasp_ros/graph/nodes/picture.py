@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 from geometry_msgs.msg import Point
-from std_msgs.msg import ColorRGBA
+from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from grasp_ros.graph.ros import messages
@@ -69,13 +69,9 @@ def markers(scene: Scene, time_ns: int, state: Array) -> MarkerArray:
 
 
 def _marker(number: int, group: str, kind: int, time_ns: int, color: Iterable[float]) -> Marker:
-    marker = Marker(ns=group, id=number, type=kind, action=Marker.ADD)
-    marker.header.frame_id = FRAME
-    marker.header.stamp = messages.to_time(time_ns)
     red, green, blue = color
-    marker.color = ColorRGBA(r=red, g=green, b=blue, a=1.0)
-    marker.pose.orientation.w = 1.0
-    return marker
+    header = Header(stamp=messages.to_time(time_ns), frame_id=FRAME)
+    return Marker(header=header, ns=group, id=number, type=kind, color=ColorRGBA(r=red, g=green, b=blue, a=1.0))
 
 
 def _line(

@@ -8,11 +8,10 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from typing import Any
 
 from rclpy.duration import Duration
-from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status, compile_kernels
@@ -29,6 +28,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW
+from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.sampled_plant import SampledPlant
 
 NO_TIME = Duration(seconds=0)
@@ -60,10 +60,8 @@ class Plant(PeerNode):
         self._recorded, self.heard_of_record = -1, -math.inf  # last tick that the monitor has; wall time of its word
         self._begin = math.nan  # wall time of the first state
         self.counters["refused records"] = 0
-        # On a terminal alone: a file or a journal gets no bar.
-        self._bar = tqdm(
-            total=self.scene.ticks, unit="tick", desc=self.scene.name, disable=None if progress else True
-        )
+        self._shown = ExitStack()
+        self._bar = self._shown.enter_context(showing(progress, self.scene.ticks, "tick", self.scene.name))
         self._states = self.publisher(JOINT_STATES)
         self._forces = [(self.publisher(output.topic), template_of(output.topic), output.value)
                         for output in self.scene.outputs]
@@ -215,8 +213,6 @@ class Plant(PeerNode):
         self._plant, self._recorded = self._new_plant(), -1
         self.resets += 1
         self._begin = time.monotonic()
-        with suppress(OSError):
-            self._bar.reset()
         self.publish_state()
 
     def finish(self) -> None:
@@ -230,13 +226,14 @@ class Plant(PeerNode):
 
     def _show(self) -> None:
         with suppress(OSError):  # a terminal that is gone ends no run
-            self._bar.update(self._plant.tick - self._bar.n)
+            if self._bar is not None:
+                self._bar(self.tick)
 
     def close(self) -> None:
         """End the progress bar, tell how a run that ends early kept its time, and deliver what has been published."""
         self._show()
         with suppress(OSError):
-            self._bar.close()
+            self._shown.close()
         if self.begun:
             self.loop.report()
         if self.finished and not self.exit_code:

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.duration import Duration, Infinite
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
@@ -27,7 +26,6 @@ from grasp_ros.graph.serialization import Template, template_of
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.system import BODIES, NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import JOINT_STATES, SCENE, Topic
 
 TYPES = {
@@ -100,17 +98,6 @@ def to_ns(stamp: Time) -> int:
 def text(content: str) -> String:
     """A text."""
     return String(data=content)
-
-
-def descriptor(parameter: Parameter) -> ParameterDescriptor:
-    """What `ros2 param describe` shows of a number of the scene."""
-    descriptor = ParameterDescriptor(
-        description=f"{parameter.text}, in {parameter.unit}", additional_constraints=f"allowed: {parameter.allowed}",
-        read_only=not parameter.live, dynamic_typing=True,
-    )
-    if not parameter.whole and not parameter.several:
-        descriptor.floating_point_range = [FloatingPointRange(from_value=parameter.low, to_value=parameter.high)]
-    return descriptor
 
 
 class State(NamedTuple):

@@ -151,10 +151,8 @@ class GraspNode(ParameterNode):
         """
         readers = self.readers(publisher)
         listening = {(reader.node_namespace, reader.node_name) for reader in readers if reader.node_name != UNKNOWN}
-        for source in sources:
-            if not any((writer.node_namespace, writer.node_name) in listening for writer in self.writers(source)):
-                return False
-        return bool(publisher.get_subscription_count() >= len(readers))
+        names = ({(writer.node_namespace, writer.node_name) for writer in self.writers(source)} for source in sources)
+        return publisher.get_subscription_count() >= len(readers) and all(map(listening.intersection, names))
 
     def count(self, counter: str, number: int = 1) -> None:
         """Add to a counter."""

@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from itertools import chain
 from typing import Any
 
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
 from rcl_interfaces.srv import SetParameters
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -19,7 +19,6 @@ from rclpy.service import Service
 from rclpy.subscription import Subscription
 
 from grasp_ros.graph.parameters import FREE, PARAMETERS
-from grasp_ros.graph.ros import messages
 from grasp_ros.physics.errors import Refused, allowed
 from grasp_ros.physics.given import plain
 from grasp_ros.scene import Scene, strict_yaml
@@ -96,7 +95,13 @@ class ParameterNode(Node):
                 if parameter.key not in scene.values[effect.section]:
                     continue
                 name, value = f"{effect.section}.{parameter.key}", scene.values[effect.section][parameter.key]
-                found = self.declare(name, list(value) if parameter.several else value, messages.descriptor(parameter))
+                shown = ParameterDescriptor(
+                    description=f"{parameter.text}, in {parameter.unit}", dynamic_typing=True,
+                    additional_constraints=f"allowed: {parameter.allowed}", read_only=not parameter.live,
+                )
+                if not parameter.whole and not parameter.several:
+                    shown.floating_point_range = [FloatingPointRange(from_value=parameter.low, to_value=parameter.high)]
+                found = self.declare(name, list(value) if parameter.several else value, shown)
                 if not parameter.accepts(found):
                     raise Refused(f"{name}: {found!r} is not allowed; allowed: {parameter.allowed}")
                 if (found := parameter.read(found)) != value:
