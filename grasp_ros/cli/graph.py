@@ -111,7 +111,7 @@ def _run(options: argparse.Namespace) -> int:
     Running(options.accuracy)  # refuses what is wrong before anything is there, as those around it do
     plant = {"paused": str(options.paused).lower()}
     if options.free_running is not None:
-        check_factor(options.free_running)
+        check_factor(options.free_running, "--free-running")
         plant.update(free_running="true", real_time_factor=repr(options.free_running), wait_for_controllers="true")
     spent = [(time.monotonic(), "begin")]
     if not kernels_on_disk():  # otherwise the plant alone loads them
@@ -216,6 +216,7 @@ def _report(graph: Graph, stopped: bool, spent: list[tuple[float, str]], options
 def _replay(options: argparse.Namespace) -> int:
     from grasp_ros.graph.bag.opening import Opened
 
+    check_factor(options.rate, "--rate")
     states = Opened(options.bag).names[JOINT_STATES]
     _reach(options)
     held = hold(os.environ, states.removesuffix(f"/{JOINT_STATES.name}") or "/")

@@ -122,8 +122,9 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("run case_01 -o \udcff", "allowed: a name in UTF-8"),
         *((f"run case_01 -o z --peer-timeout {word}", f"peer_timeout_s: {word} is not allowed; allowed: a number > 0")
           for word in ("0", "-1", "nan", "70")),
-        ("run case_01 -o z --free-running 0", "real_time_factor: 0.0 is not allowed; allowed: 1e-06 to 1e+06"),
-        ("run case_01 -o z --free-running nan", "real_time_factor: nan is not allowed"),
+        ("run case_01 -o z --free-running 0", "--free-running: 0.0 is not allowed; allowed: 1e-06 to 1e+06"),
+        ("replay nope --rate 0", "--rate: 0.0 is not allowed; allowed: 1e-06 to 1e+06"),
+        ("run case_01 -o z --free-running nan", "--free-running: nan is not allowed"),
         ("run case_01 -o z --controller left=nowhere:soft", "left_controller: law: nowhere:soft: no module nowhere;"),
         *((f"run case_01 -o z --controller left={module}:law", f"cannot be imported: {error}")
           for module, error in (("exits", "SystemExit: 0"), ("breaks", "BrokenPipeError, "))),
