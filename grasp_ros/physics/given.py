@@ -54,6 +54,8 @@ def read_number(text: str) -> float:
 
 def whole(name: str, value: Any, low: int) -> int:
     """A whole number >= low; 1e7 is one."""
+    if type(value) is int and value >= low:  # most are
+        return value
     found = plain(value)
     if found is None or not math.isfinite(found) or found != math.floor(found) or found < low:
         raise Refused(f"{name}: {value!r} is not allowed; allowed: a whole number >= {low}")
