@@ -11,7 +11,8 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from grasp_ros.graph.lockstep.synchronizer import Tick
-from grasp_ros.graph.serialization import raw_force, raw_stamp_ns
+from grasp_ros.graph.ros.messages import to_ns
+from grasp_ros.graph.serialization import raw_force
 from grasp_ros.physics.energy import energy, energy_balance
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
@@ -56,7 +57,8 @@ class LyapunovMonitor:
             raise Refused(f"{side}/parameters: {len(cdr)} bytes; allowed: at most {MOST_BYTES}")
         message = deserialize_message(cdr, JointState)
         self.lost += self._numbers[side].take(message)
-        announcement = Announcement(raw_stamp_ns(cdr), dict(zip(message.name, message.position, strict=True)), cdr)
+        stamp, numbers = to_ns(message.header.stamp), dict(zip(message.name, message.position, strict=True))
+        announcement = Announcement(stamp, numbers, cdr)
         wanted = set(self._scene.numbers_of(f"{side}_controller"))
         if set(announcement.numbers) != wanted:
             raise Refused(f"{side}/parameters: {', '.join(announcement.numbers) or 'nothing'}; allowed: exactly"
