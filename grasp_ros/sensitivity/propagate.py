@@ -18,13 +18,12 @@ from grasp_ros.exact.driver.callback import FINISH, REST
 from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, surface_factor
 from grasp_ros.exact.numerics.polynomial import invert_time
-from grasp_ros.exact.numerics.roots import value_and_rate
+from grasp_ros.exact.numerics.roots import shift, value_and_rate
 from grasp_ros.exact.records import Order, Step
 from grasp_ros.exact.tolerances import SURFACE
 from grasp_ros.physics.impact_law import EXPONENT
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, Slide, U, V, X
-from grasp_ros.sensitivity.base_series import touches
-from grasp_ros.sensitivity.contact import exact_length, expand_tangents, shift, step_tangents
+from grasp_ros.sensitivity.contact import exact_length, expand_tangents, step_tangents, touches
 from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent, write_flows
 from grasp_ros.sensitivity.held import act, enter_tick
 from grasp_ros.sensitivity.tangents import UNSEEN, Count, Number, Tangents, copy_matrix, tangents_at
@@ -40,20 +39,11 @@ def impact_now(t: Tangents, side: Body) -> float:
 
 
 @kernel
-def turning_ratio(t: Tangents) -> float:
-    """Acceleration of an object that turns, after the turn, by that before it; nan if there was none before."""
-    push, new = impact_now(t, LEFT) - impact_now(t, RIGHT), t.bodies[OBJECT]
-    push -= new[Of.STIFFNESS] * t.before[X.O] + new[Of.DAMPING] * t.before[V.O]
-    first = push + t.numbers[Number.FORCE]  # under the constant force before
-    return (push + new[Of.FORCE]) / first if first != 0.0 else math.nan
-
-
-@kernel
 def friction_factor(t: Tangents, at_tick: bool) -> float:
     """What the tangent of the object's velocity is multiplied by where the mode of its dry friction has changed.
 
-    It is nan where the one-sided derivatives differ. Of an object that stops just when inputs change nobody knows which
-    of them would act on it.
+    Where the object turns, that is its acceleration after the turn by that before it. It is nan where the one-sided
+    derivatives differ. Of an object that stops just when inputs change nobody knows which of them would act on it.
     """
     before = t.counts[Count.SLIDE]
     slid = before == Slide.RIGHTWARD or before == Slide.LEFTWARD
@@ -62,7 +52,10 @@ def friction_factor(t: Tangents, at_tick: bool) -> float:
     if t.mode[OBJECT] == Slide.STUCK:
         return 0.0
     if slid:
-        return turning_ratio(t)
+        push, new = impact_now(t, LEFT) - impact_now(t, RIGHT), t.bodies[OBJECT]
+        push -= new[Of.STIFFNESS] * t.before[X.O] + new[Of.DAMPING] * t.before[V.O]
+        first = push + t.numbers[Number.FORCE]  # under the constant force before
+        return (push + new[Of.FORCE]) / first if first != 0.0 else math.nan
     if before == UNSEEN and t.before[V.O] == 0.0:
         for j in range(t.x.shape[1]):
             if t.x[V.O, j] != 0.0:
@@ -196,7 +189,8 @@ def pass_step(t: Tangents, begin: float, span: float, s: float, unit: float, n: 
         copy_matrix(t.at, t.x)  # what flies stays at the begin
         step_tangents(t, n, part)
         copy_matrix(t.x, t.at)
-        shift(t.c, n, part)
+        for lane in range(LANES):
+            shift(t.c[lane::LANES], n, part)
         s -= part
 
 

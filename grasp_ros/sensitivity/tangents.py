@@ -32,7 +32,7 @@ ODD = LANES * HALF  # sums of one coefficient: of the states, and of the two pai
 SUMS = 2 * ODD  # of one of even order and of the next one
 WEIGHTS = HALF * TERMS
 FLOWS = 16 * HALF  # numbers of the flows of all bodies
-AHEAD = 8  # orders that `base_series.multiply` finds at a time
+AHEAD = 8  # orders that `contact.multiply` finds at a time
 ROOM = HALF * (TERMS + 2 * AHEAD)  # of four series for it
 COLUMNS = len(Column)
 UNSEEN = -1  # slide before the first segment
@@ -119,7 +119,7 @@ class Tangents(NamedTuple):
     rows: Array  # (ROWS, TERMS) of the run, see `Row`
     weights: Array  # (5 WEIGHTS,) of the run, see `Weight`
     factors: Array  # (2, ROOM)
-    products: Array  # (3, ROOM) see `base_series.pair_series`
+    products: Array  # (3, ROOM) see `contact.pair_series`
     sums: Array  # (N / HALF SUMS,) of products
     matrices: Array  # (5, 6, 6)
     flows: Array  # (FLOWS,) see `flight.Flow`
