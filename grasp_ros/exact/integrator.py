@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable
 from enum import Enum
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
 from grasp_ros.exact.compilation.jit import compiling
 from grasp_ros.exact.driver.advance import advance
+from grasp_ros.exact.driver.callback import Observer
 from grasp_ros.exact.driver.outputs import SPARE
 from grasp_ros.exact.driver.rest import SINCE
 from grasp_ros.exact.driver.workspace import workspace
@@ -19,11 +19,9 @@ from grasp_ros.exact.events import Event, to_events
 from grasp_ros.exact.records import (
     BODY_NUMBERS,
     REST_PLACE,
-    Integers,
     Loop,
     Plant,
     State,
-    Tables,
     new_state,
     one_interval,
     plant_of,
@@ -61,13 +59,6 @@ _NO_TIMES, _NOBODY = np.zeros(0), np.zeros(2, dtype=np.int64)
 _DONE, _NO_COMMAND = int(Outcome.DONE), int(Outcome.NO_COMMAND)
 _AT_REST = REST_PLACE + SINCE  # in the block of a state
 _BODIES_THAT_ACT = [0.0] * BODY_NUMBERS  # `Plant.bodies`, which the kernels write
-
-
-class Observer(Protocol):
-    """Segment callback of a run."""
-
-    def attach(self, tables: Tables) -> Integers:
-        """Addresses (2,) of a function and of its context, see `driver.callback`, for a run with this workspace."""
 
 
 class Integrator:

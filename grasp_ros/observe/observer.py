@@ -8,10 +8,10 @@ import numpy as np
 
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import door, inlined, kernel
-from grasp_ros.exact.driver.callback import FINISH, REST, address_of, block_of, call
+from grasp_ros.exact.driver.callback import FINISH, REST, Observer, address_of, call
 from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.exact.records import Array, Integers, Plant, State, Tables
+from grasp_ros.exact.records import Array, Plant, State
 from grasp_ros.observe.extremes import extremes_of, may_exceed, owner, weights, write_ranges
 from grasp_ros.observe.losses import add_losses
 from grasp_ros.observe.record import (
@@ -164,7 +164,7 @@ def observe_losses(address: int, kind: int, t: float, s: float, unit: float, deg
     return 0
 
 
-class RunObserver:
+class RunObserver(Observer):
     """Watches the runs that use the arrays of one plant and one state, one run after the other.
 
     Parameters
@@ -181,27 +181,13 @@ class RunObserver:
         What is remembered.
     """
 
+    TABLES = "c", "size"
+
     def __init__(self, plant: Plant, state: State, wanted: Wanted) -> None:
-        self.memory = memory_of(plant, state)
+        super().__init__(observe, memory_of(plant, state))
         self.seen, switches = self.memory.seen, self.memory.switches
         switches[Switch.WANTED] = wanted
         switches[Switch.LOSSES] = address_of(observe_losses) if wanted & Wanted.LOSSES else 0
-        self._address = address_of(observe)  # before a call: of other types on disk it would be compiled twice
-        self._tables, self._block = self.memory.c, block_of(self.memory)
-
-    def attach(self, tables: Tables) -> Integers:
-        """What a run with this workspace calls after each segment."""
-        if tables.c is not self._tables:  # a run in many pieces brings the same ones
-            self._tables, self._block = tables.c, block_of(self.memory._replace(c=tables.c, size=tables.size))
-        return np.array([self._address, self._block.ctypes.data])
-
-    def begin(self, bound: float) -> None:
-        """Before a run; `bound` is the part of the largest displacement that counts as settled."""
-        observe(self._block.ctypes.data, BEGIN, float(bound), 0.0, 0.0, 0)
-
-    def finish(self) -> None:
-        """After a run."""
-        observe(self._block.ctypes.data, FINISH, 0.0, 0.0, 0.0, 0)
 
 
 def settle(integrator: Integrator, run_observer: RunObserver, stretch: float, horizons: int) -> None:
@@ -230,6 +216,6 @@ def watch(integrator: Integrator, wanted: Wanted, bound: float) -> RunObserver:
     if integrator.continuous:
         memory.base[:], memory.switches[Switch.CERTAIN] = memory.loop, not system.caveats
         memory.gains[:] = system.law_rows[:, : Column.SET_POINT]
-    run_observer.begin(bound)
+    run_observer.tell(BEGIN, float(bound))
     integrator.observer = run_observer
     return run_observer

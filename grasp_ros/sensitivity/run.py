@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
-from grasp_ros.exact.driver.callback import FINISH, address_of, block_of
+from grasp_ros.exact.driver.callback import Observer
 from grasp_ros.exact.integrator import Integrator
-from grasp_ros.exact.records import Integers, Tables
 from grasp_ros.physics.control import normals_over
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
@@ -17,7 +16,7 @@ from grasp_ros.sensitivity.propagate import propagate
 from grasp_ros.sensitivity.tangents import Count, Number, tangents_of
 
 
-class Carrier:
+class Carrier(Observer):
     """Carries the tangents of one run along, as the observer of its integrator.
 
     Parameters
@@ -58,23 +57,12 @@ class Carrier:
                     normals[:, side] = normals_over(law.seed, 0, scene.ticks + 1)
             tangents = tangents._replace(control=system.law_rows, control_rates=directions.laws, normals=normals,
                                          waiting=np.zeros((system.delay, 2, n)))
-        self._tangents, self.x, self.out, self.forces = tangents, tangents.x[:, :n], tangents.out, tangents.forces
+        super().__init__(propagate, tangents)
+        self.x, self.out, self.forces = tangents.x[:, :n], tangents.out, tangents.forces
         integrator.observer = self
-
-    def attach(self, tables: Tables) -> Integers:
-        """What a run with this workspace calls after each segment."""
-        if tables.c is not self._tangents.c:  # a run in many pieces brings the same ones
-            self._tangents = self._tangents._replace(c=tables.c)
-            self._block = block_of(self._tangents)
-        return np.array([address_of(propagate), self._block.ctypes.data])
-
-    def finish(self) -> None:
-        """After a run, at its end."""
-        address_of(propagate)
-        propagate(self._block.ctypes.data, FINISH, 0.0, 0.0, 0.0, 0)
 
     @property
     def corner(self) -> float | None:
         """First time in s at which one-sided derivatives differ; None: there is none."""
-        corner = float(self._tangents.numbers[Number.CORNER])
+        corner = float(self.memory.numbers[Number.CORNER])
         return corner if math.isfinite(corner) else None

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import cfunc, typeof
 
-from grasp_ros.exact.driver.callback import SIGNATURE, block_of, reader
+from grasp_ros.exact.driver.callback import SIGNATURE, Observer, block_of, reader
 from grasp_ros.exact.records import Integers, Tables
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -40,7 +40,7 @@ def read_clock(context: int, kind: int, t: float, s: float, unit: float, degree:
     return 0
 
 
-class SegmentClock:
+class SegmentClock(Observer):
     """Times the segments of one run; `most` is how many it has at most."""
 
     def __init__(self, most: int) -> None:

@@ -3,26 +3,59 @@
 An address in place of a function keeps the observer out of the machine code of the run: a run without an observer is
 compiled without one and loses one comparison for each segment, and neither changes a bit of the motion. The observer is
 called when the segment is over and before its transitions, so that modes and bodies are still those of the segment.
+
+Its memory is a record of arrays behind an address, of which kernels load the fields that they use. As a value a record
+of twenty arrays is 150 numbers. Each function that gets it takes them apart and puts them together, which was half of
+what was compiled for an observer.
 """
 
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from typing import Any, ClassVar
 from weakref import finalize
 
 import numpy as np
-from numba.core.types import float64, int64
+from numba.core import cgutils
+from numba.core.types import Type, float64, int64
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import infer_getattr, lower_getattr_generic, models, register_model
 
 from grasp_ros.exact.compilation.jit import COMPILED, address_of_code, code_of_call, inlined, instruction
-from grasp_ros.exact.compilation.reference import Reference
-from grasp_ros.exact.records import Integers, Segment
+from grasp_ros.exact.records import Integers, Segment, Tables
 
 ADDRESS, CONTEXT = 0, 1  # places of an observer
 FINISH, REST = -1, -3  # in place of a kind of segment: after a run, and where nothing moves in an interval
 SIGNATURE = int64(int64, int64, float64, float64, float64, int64)  # of an observer, see `notify`
 _FUNCTIONS: dict[int, Any] = {}  # where nothing is compiled
 _RECORDS: dict[int, Any] = {}  # likewise
+
+
+class Reference(Type):
+    """The type of a record behind its address: a pointer to the numbers of a named tuple."""
+
+    def __init__(self, record: Any) -> None:
+        self.record = record
+        super().__init__(f"Reference({record})")
+
+
+@register_model(Reference)
+class _Pointer(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Reference) -> None:
+        super().__init__(manager, kind, manager.lookup(kind.record).get_data_type().as_pointer())
+
+
+@infer_getattr
+class _Fields(AttributeTemplate):
+    key = Reference
+
+    def generic_resolve(self, reference: Reference, name: str) -> Any:
+        return reference.record.types[reference.record.fields.index(name)]
+
+
+@lower_getattr_generic(Reference)  # type: ignore[untyped-decorator]
+def _field(_: Any, builder: Any, reference: Reference, address: Any, name: str) -> Any:
+    return builder.load(cgutils.gep_inbounds(builder, address, 0, reference.record.fields.index(name)))
 
 
 @instruction(lambda _, address, context, kind, t, s, unit, degree: (int64(int64, *SIGNATURE.args), code_of_call))
@@ -79,3 +112,34 @@ def notify(observer: Integers, segment: Segment) -> None:
         step = segment.step
         call(observer[ADDRESS], observer[CONTEXT], np.int64(segment.kind), segment.t, segment.s, step.unit,
              step.order.number)
+
+
+class Observer:
+    """An observer of a run: a function, and the record that is its memory.
+
+    Attributes
+    ----------
+    memory : named tuple of arrays
+        The fields TABLES are those of the workspace of the run.
+    """
+
+    TABLES: ClassVar[tuple[str, ...]] = ("c",)
+
+    def __init__(self, function: Any, memory: Any) -> None:
+        self._address, self._function = address_of(function), function
+        self.memory, self._block = memory, block_of(memory)
+
+    def attach(self, tables: Tables) -> Integers:
+        """Addresses (2,) of the function and of its memory, for a run with this workspace."""
+        if tables.c is not self.memory.c:  # a run in many pieces brings the same ones
+            self.memory = self.memory._replace(**{name: getattr(tables, name) for name in self.TABLES})
+            self._block = block_of(self.memory)
+        return np.array([self._address, self._block.ctypes.data])
+
+    def tell(self, kind: int, number: float = 0.0) -> None:
+        """Call the function with another kind than that of a segment."""
+        self._function(self._block.ctypes.data, kind, number, 0.0, 0.0, 0)
+
+    def finish(self) -> None:
+        """After a run."""
+        self.tell(FINISH)
