@@ -66,10 +66,7 @@ def instruction(typing: Callable[..., Any]) -> Callable[[K], K]:
 
     `typing` is for `numba.extending.intrinsic`: from the types of the arguments to a signature, and to what emits code.
     """
-    def replace(plain: Any) -> Any:
-        return intrinsic(typing) if COMPILED else plain
-
-    return replace
+    return lambda plain: intrinsic(typing) if COMPILED else plain
 
 
 def code_of_call(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -77,11 +74,6 @@ def code_of_call(context: Any, builder: Any, signature: Any, arguments: Any) -> 
     kinds = [context.get_value_type(kind) for kind in (signature.return_type, *signature.args[1:])]
     function = ir.FunctionType(kinds[0], kinds[1:])
     return builder.call(builder.inttoptr(arguments[0], function.as_pointer()), arguments[1:])
-
-
-@cache
-def _door(function: Callable[..., Any]) -> Any:
-    return door(function)
 
 
 def compiling(function: Callable[[], None]) -> Callable[[], None]:
@@ -121,5 +113,5 @@ def _compiled(function: K, *, door: bool, counts: bool = False, inline: bool = F
     if COMPILED and door:
         found._cache = KernelCache(function)
     elif COMPILED:
-        found.__class__, found.door = Kernel, partial(_door, function)
+        found.__class__, found.door = Kernel, cache(partial(_compiled, function, door=True))
     return found

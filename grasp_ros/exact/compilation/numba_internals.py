@@ -20,13 +20,7 @@ from numba.core.registry import CPUDispatcher
 from numba.core.serialize import dumps
 from numba.core.types import BaseFunction
 
-from grasp_ros.exact.compilation.kernel_cache import (
-    cache_directory,
-    read_checked,
-    say_compiling,
-    say_damaged,
-    write_checked,
-)
+from grasp_ros.exact.compilation import kernel_cache
 
 
 class Part(JITCodeLibrary):
@@ -67,7 +61,7 @@ def _parts(dispatcher: CPUDispatcher) -> Iterator[None]:
     """Compile as `Part`, and remember the types of calls, in this thread, which must have numba's lock."""
     own, before_typing = vars(dispatcher.targetctx.codegen()), _FUNCTION.get_call_type
     before = own.copy()
-    own.update(_library_class=Part, set_env=_no_environment)
+    own.update(_library_class=Part, set_env=lambda *_: None)  # nothing to hand over to: there is no machine code
     _FUNCTION.get_call_type = _call_type
     try:
         yield
@@ -92,10 +86,6 @@ def _call_type(function: BaseFunction, context: Any, arguments: Any, named: Any)
     return _known[key]
 
 
-def _no_environment(*_: object) -> None:
-    """Hand nothing over to machine code that is not there."""
-
-
 class KernelCache(NullCache):
     """Machine code of a function on disk: a file for each signature and machine, with its checksum.
 
@@ -104,7 +94,7 @@ class KernelCache(NullCache):
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        code, self._directory = function.__code__, cache_directory()
+        code, self._directory = function.__code__, kernel_cache.cache_directory()
         self._name = f"{function.__module__}.{function.__qualname__}"
         self._key = code.co_filename, code.co_firstlineno, code.co_code, numba.__version__, llvmlite.__version__
 
@@ -112,18 +102,18 @@ class KernelCache(NullCache):
         """Machine code for arguments of some types; None if there is none."""
         target.refresh()
         try:
-            return CompileResult._rebuild(target, *pickle.loads(read_checked(self._path(signature, target.codegen()))))
+            content = kernel_cache.read_checked(self._path(signature, target.codegen()))
+            return CompileResult._rebuild(target, *pickle.loads(content))
         except FileNotFoundError:
-            say_compiling()
-            return None
+            kernel_cache.say_compiling()
         except Exception:
-            say_damaged()
-            return None
+            kernel_cache.say_damaged()
+        return None
 
     def save_overload(self, signature: Any, result: Any) -> None:
         """Keep machine code. It is a help, no need: a disk that is full only means to compile again."""
         with suppress(OSError):
-            write_checked(self._path(signature, result.codegen), dumps(result._reduce()))
+            kernel_cache.write_checked(self._path(signature, result.codegen), dumps(result._reduce()))
 
     def _path(self, signature: Any, codegen: Any) -> Path:
         key = repr((signature, codegen.magic_tuple(), self._key)).encode()
