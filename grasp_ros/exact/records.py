@@ -146,7 +146,6 @@ class Tables(NamedTuple):
     at: Array  # (2 LANES,) values of the lanes at some s, and their changes since 0
     size: Array  # (LANES,) their sums of |c_k| s^k, k >= 2
     row: Array  # (order + 1,) one polynomial
-    copy: Array  # (order + 1,) another one
 
 
 def tables_of(block: Array, order: int) -> Tables:
@@ -155,13 +154,12 @@ def tables_of(block: Array, order: int) -> Tables:
     at = f + FACTORS * (order + 1)
     size = at + 2 * LANES
     row = size + LANES
-    copy = row + order + 1
-    return Tables(block[:f], block[f:at], block[at:size], block[size:row], block[row:copy], block[copy:])
+    return Tables(block[:f], block[f:at], block[at:size], block[size:row], block[row:])
 
 
 def numbers_of_tables(order: int) -> int:
     """Length of the block of a workspace."""
-    return (LANES + FACTORS + 2) * (order + 1) + 3 * LANES
+    return (LANES + FACTORS + 1) * (order + 1) + 3 * LANES
 
 
 class Step(NamedTuple):

@@ -195,7 +195,7 @@ def test_a_push_is_certain_since_it_exceeds_its_rounding_or_from_the_begin(
     b = bench(side, 1.0, -2.0, Pair.CLAMPED, coulomb=5.0, slide=Slide.STUCK)
     row, empty = np.zeros(3), np.zeros(16)
     row[0], row[1] = begin, 10.0 if begin == 0.0 else 0.0
-    tables = Tables(np.zeros(3 * LANES), empty, np.zeros(2 * LANES), empty, row, empty)
+    tables = Tables(np.zeros(3 * LANES), empty, np.zeros(2 * LANES), empty, row)
     found = since_certain(tables, b.plant, b.state.mode, 2, 1.0)
     assert found.what is Slide.RIGHTWARD
     assert found.when == pytest.approx(expected, rel=1e-13, abs=1e-30)

@@ -75,7 +75,7 @@ def tables_of(table: Array, value: Array | None = None, size: Array | None = Non
     """A workspace with a finished table, and what was computed from it."""
     empty = np.zeros(2 * LANES)
     value, size = (empty if given is None else given for given in (value, size))
-    return Tables(table.ravel(), empty, value, size, empty, empty)
+    return Tables(table.ravel(), empty, value, size, empty)
 
 
 def sides(name: str) -> tuple[bool, bool]:

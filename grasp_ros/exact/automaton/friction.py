@@ -156,14 +156,14 @@ def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, noise: tuple[
                    ) -> Candidate:
     """First s in (0, h] at which an impact on a stuck object, `tables.row` in N, overcomes the friction.
 
-    `noise` is the rounding of the force on it, at 0 and at h.
+    `noise` is the rounding of the force on it, at 0 and at h. `tables.f` is scratch.
     """
-    row, copy = tables.row, tables.copy
+    row, against = tables.row, tables.f
     push = row[0] + plant.given[OBJECT, Of.FORCE]
     for k in range(n + 1):
-        copy[k] = -row[k]
-    row[0], copy[0] = push - plant.coulomb, -push - plant.coulomb
-    to_right, to_left = overcome(row, n, h, noise, work), overcome(copy, n, h, noise, work)
+        against[k] = -row[k]
+    row[0], against[0] = push - plant.coulomb, -push - plant.coulomb
+    to_right, to_left = overcome(row, n, h, noise, work), overcome(against, n, h, noise, work)
     if math.isnan(to_right) or math.isnan(to_left):
         return Candidate(math.nan, Slide.STUCK)
     return Candidate(to_right, Slide.RIGHTWARD) if to_right <= to_left else Candidate(to_left, Slide.LEFTWARD)
