@@ -13,20 +13,9 @@ from grasp_ros.exact.compilation.jit import compiling
 from grasp_ros.exact.driver.advance import advance
 from grasp_ros.exact.driver.callback import Observer
 from grasp_ros.exact.driver.outputs import SPARE
-from grasp_ros.exact.driver.rest import SINCE
 from grasp_ros.exact.driver.workspace import workspace
 from grasp_ros.exact.events import Event, to_events
-from grasp_ros.exact.records import (
-    BODY_NUMBERS,
-    REST_PLACE,
-    Loop,
-    Plant,
-    State,
-    new_state,
-    one_interval,
-    plant_of,
-    state_of,
-)
+from grasp_ros.exact.records import BODY_NUMBERS, Loop, Plant, State, new_state, one_interval, plant_of, state_of
 from grasp_ros.physics import given
 from grasp_ros.physics.accuracy import ACCURACY, check_accuracy
 from grasp_ros.physics.energy import energy
@@ -57,7 +46,6 @@ class Status(Enum):
 _OUTPUTS, _EVENTS, _FILLED, _WORK = int(Filled.OUTPUTS), int(Filled.EVENTS), len(Filled), len(Work)
 _NO_TIMES, _NOBODY = np.zeros(0), np.zeros(2, dtype=np.int64)
 _DONE, _NO_COMMAND = int(Outcome.DONE), int(Outcome.NO_COMMAND)
-_AT_REST = REST_PLACE + SINCE  # in the block of a state
 _BODIES_THAT_ACT = [0.0] * BODY_NUMBERS  # `Plant.bodies`, which the kernels write
 
 
@@ -109,7 +97,6 @@ class Integrator:
         self._max_events, self._max_work = whole("max_events", max_events, 0), whole("max_work", max_work, 0)
         self._plant_block = _block_of(system, continuous)
         self._state_block, self._mode = new_state(*state, state[X.L] - state[X.O], state[X.O] - state[X.R])
-        self._state_block[_AT_REST] = math.inf
         self._events: list[Array] = []
         self._event_count = 0
         self.observer: Observer | None = None
@@ -143,7 +130,7 @@ class Integrator:
     @property
     def at_rest(self) -> float | None:
         """Time in s since when everything is at rest, see `driver.rest`; None if it is not."""
-        since = float(self._state_block[_AT_REST])
+        since = float(self._state_block[-1])  # `State.rest[SINCE]`
         return since if math.isfinite(since) else None
 
     @property

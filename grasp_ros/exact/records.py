@@ -60,8 +60,8 @@ def state_of(block: Array, mode: Integers) -> State:
 
 
 def new_state(*y: float) -> tuple[Array, Integers]:
-    """Where a run begins, for `state_of`: a block of numbers, first those of `State.y`, and modes not yet known."""
-    return np.array([*y, *[0.0] * (STATE_NUMBERS - len(y))]), _UNKNOWN.copy()
+    """Where a run begins, not at rest, for `state_of`: a block, first the numbers of `State.y`; modes not yet known."""
+    return np.array([*y, *[0.0] * (STATE_NUMBERS - 1 - len(y)), np.inf]), _UNKNOWN.copy()
 
 
 def new_run() -> tuple[Array, Array, Plant, State]:
