@@ -129,6 +129,15 @@ def derivatives(body: Array, x: float, v: float, order: int) -> tuple[float, flo
     return value, size
 
 
+@kernel
+def difference(plant: Plant, y: Array, side: Body, order: int) -> tuple[float, float]:
+    """A derivative of u without impact forces, and the sum of the sizes of its terms."""
+    x, v, sign = arm_of(y, side)
+    value, size = derivatives(plant.bodies[side], x, v, order)
+    value_o, size_o = derivatives(plant.bodies[OBJECT], y[X.O], y[V.O], order)
+    return sign * (value - value_o), size + size_o
+
+
 @inlined
 def is_closed(mode: Pair) -> bool:
     """Whether a pair is between its touch and its release."""

@@ -13,7 +13,7 @@ from exact.bench import Bench, bench, bits, drive
 from gmpy2 import mpfr
 from oracles import FREE, done, kinds, run
 
-from grasp_ros.exact.automaton.begin import force_free_time, leaves_force_out, must_begin
+from grasp_ros.exact.automaton.begin import force_free_time, is_negligible, leaves_force_out, must_begin
 from grasp_ros.exact.automaton.edge import HIGHEST
 from grasp_ros.exact.automaton.friction import apply_friction
 from grasp_ros.exact.automaton.modes import initial_modes
@@ -250,6 +250,29 @@ def test_a_pair_that_turns_back_leaves_out_no_contact(side: Body, hertzian: floa
 def test_nothing_moves_a_pair_that_only_another_one_will_press(side: Body) -> None:
     assert force_free_time(np.zeros(HIGHEST + 1), *bench(side, 0.0, 0.0, Pair.BEGINNING)[:2], side) == math.inf
     assert force_free_time(np.zeros(HIGHEST + 1), *bench(side, 0.0, 0.3, Pair.CONTACT)[:2], side) == math.inf
+
+
+# The impulse that a pair leaves out.
+
+
+@SIDES
+@pytest.mark.parametrize(("u", "stuck", "negligible"), [(1e-10, False, True), (1e-10, True, False), (1e-14, True, True),
+                                                        (1e-6, False, False)])
+def test_a_stuck_object_takes_a_smaller_force_for_one(side: Body, u: float, stuck: bool, negligible: bool) -> None:
+    """Of 1 kg at 1 m/s the impulses 1e-21, 1e-31 and 1e-11 N s; 1 N of friction holds against 1e-11 and 1e-17 N."""
+    b = bench(side, u, 1.0, p=0.0, coulomb=1.0)
+    if stuck:
+        b.plant.bodies[OBJECT, Of.MASS] = math.inf
+    assert bool(is_negligible(b.plant, side, u, 1.0, EPS)) is negligible
+
+
+@SIDES
+@pytest.mark.parametrize(("u", "d", "negligible"), [(0.0, 0.0, True), (-1e-3, 1.0, True), (1e-3, 0.0, False)])
+def test_without_penetration_there_is_no_impulse_and_without_approach_no_bound(
+    side: Body, u: float, d: float, negligible: bool
+) -> None:
+    b = bench(side, u, d)
+    assert bool(is_negligible(b.plant, side, u, d, EPS)) is negligible
 
 
 # Whole runs.

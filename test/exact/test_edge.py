@@ -16,21 +16,19 @@ from grasp_ros.exact.automaton.edge import (
     NEVER,
     UNDECIDED,
     deciding_derivative,
-    difference,
     glides,
     has_glided,
-    is_negligible,
     other_push,
     parting_time,
     separates,
     surface_side,
 )
-from grasp_ros.exact.automaton.modes import leave_gliding, turn_back
+from grasp_ros.exact.automaton.modes import let_leave, make_transition
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.exact.kinematics import other
+from grasp_ros.exact.kinematics import difference, other
 from grasp_ros.exact.records import Deciding, Plant, State
 from grasp_ros.exact.tolerances import DERIVATIVE, SURFACE
-from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Of, Pair, Slide, U, Work, X
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Of, Pair, Slide, Transition, U, Work, X
 from grasp_ros.physics.model import Contact
 from lab.reference.grasp import Grasp, system_of
 
@@ -260,26 +258,6 @@ def test_a_pair_that_is_closed_without_a_force(side: Body, mode: Pair, expected:
     assert deciding_derivative(b.plant, b.state, side) == pytest.approx(expected)
 
 
-@SIDES
-@pytest.mark.parametrize(("u", "stuck", "negligible"), [(1e-10, False, True), (1e-10, True, False), (1e-14, True, True),
-                                                        (1e-6, False, False)])
-def test_a_stuck_object_takes_a_smaller_force_for_one(side: Body, u: float, stuck: bool, negligible: bool) -> None:
-    """Of 1 kg at 1 m/s the impulses 1e-21, 1e-31 and 1e-11 N s; 1 N of friction holds against 1e-11 and 1e-17 N."""
-    b = bench(side, u, 1.0, p=0.0, coulomb=1.0)
-    if stuck:
-        b.plant.bodies[OBJECT, Of.MASS] = math.inf
-    assert bool(is_negligible(b.plant, side, u, 1.0, EPS)) is negligible
-
-
-@SIDES
-@pytest.mark.parametrize(("u", "d", "negligible"), [(0.0, 0.0, True), (-1e-3, 1.0, True), (1e-3, 0.0, False)])
-def test_without_penetration_there_is_no_impulse_and_without_approach_no_bound(
-    side: Body, u: float, d: float, negligible: bool
-) -> None:
-    b = bench(side, u, d)
-    assert bool(is_negligible(b.plant, side, u, d, EPS)) is negligible
-
-
 # How long the sign is certain.
 
 
@@ -388,9 +366,9 @@ def test_a_feedback_that_drives_makes_no_time_longer() -> None:
 @SIDES
 @pytest.mark.parametrize("mode", list(Pair))
 def test_only_a_pair_that_leaves_is_turned_back(side: Body, mode: Pair) -> None:
-    b = bench(side, 0.0, 0.3, Pair.LEAVING, beside=(0.01, -2.0), beside_mode=mode)
-    turn_back(b.state, side)
-    assert b.mode(side) is Pair.LEAVING
+    b = bench(side, 0.0, 0.3, Pair.OPEN, beside=(0.01, -2.0), beside_mode=mode)
+    make_transition(b.plant, b.state, side, Transition.TOUCH, False, b.out)
+    assert b.mode(side) is Pair.CONTACT
     assert b.mode(other(side)) is (Pair.CONTACT if mode is Pair.LEAVING else mode)
 
 
@@ -487,7 +465,7 @@ def test_a_pair_has_glided_at_the_surface_alone(side: Body, d: float, options: d
 def test_a_pair_in_contact_leaves_where_nothing_moves_it(side: Body, d: float, options: dict[str, Any], expected: Pair
                                                          ) -> None:
     b = bench(side, 0.01, d, Pair.CONTACT, **options)
-    leave_gliding(b.plant, b.state)
+    let_leave(b.plant, b.state, b.settings)
     assert (b.mode(side), b.mode(other(side)), b.events) == (expected, Pair.OPEN, [])
 
 
@@ -495,7 +473,7 @@ def test_a_pair_in_contact_leaves_where_nothing_moves_it(side: Body, d: float, o
 @pytest.mark.parametrize("mode", [mode for mode in Pair if mode not in (Pair.CONTACT, Pair.LEAVING)])
 def test_only_a_pair_in_contact_leaves(side: Body, mode: Pair) -> None:
     b = bench(side, 0.01, -2.0, mode)
-    leave_gliding(b.plant, b.state)
+    let_leave(b.plant, b.state, b.settings)
     assert b.mode(side) is mode
 
 

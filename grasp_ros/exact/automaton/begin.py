@@ -16,8 +16,8 @@ from grasp_ros.exact.kinematics import approach, other, rate_lanes, reduced_mass
 from grasp_ros.exact.numerics.powers_of_two import exponent, power_of_two
 from grasp_ros.exact.numerics.roots import value_and_rate
 from grasp_ros.exact.records import Array, Plant, State
-from grasp_ros.exact.tolerances import FORCE_FREE
-from grasp_ros.physics.layout import Body, Law, Pair, U
+from grasp_ros.exact.tolerances import DERIVATIVE, FORCE_FREE
+from grasp_ros.physics.layout import OBJECT, Body, Law, Of, Pair, U
 
 MOST_HALVINGS = 200  # of a short flight
 
@@ -72,3 +72,18 @@ def leaves_force_out(plant: Plant, side: Body, u: float, d: float, speed: float)
     # A stuck object slips by the force, not by the impulse.
     hidden = plant.coulomb == 0.0 or force <= FORCE_FREE * plant.coulomb
     return bool(hidden and force * (u / d) <= FORCE_FREE * motion)
+
+
+@kernel
+def is_negligible(plant: Plant, side: Body, u: float, d: float, part: float) -> bool:
+    """Whether the impulse of a pair between u = 0 and u is below a part of mu u', with the reduced mass mu.
+
+    If the object sticks the force itself must be negligible, too: whether the object slips depends on it.
+    """
+    pair, d = plant.pairs[side], abs(d)
+    if u <= 0.0 or d == 0.0:
+        return u <= 0.0
+    force = elastic_force(pair[Law.HERTZIAN], u) * damping_factor(pair[Law.DISSIPATION], d)
+    if plant.bodies[OBJECT, Of.MASS] == math.inf and force > DERIVATIVE * plant.coulomb:
+        return False
+    return force * (u / d) <= part * reduced_mass(plant.bodies, side) * d

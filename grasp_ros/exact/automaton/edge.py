@@ -10,22 +10,14 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.compilation.jit import kernel, whole
-from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
-from grasp_ros.exact.kinematics import (
-    approach,
-    arm_of,
-    derivatives,
-    other,
-    reduced_mass,
-    relative_motion,
-    surface_factor,
-)
+from grasp_ros.exact.impact import elastic_force, elastic_slope
+from grasp_ros.exact.kinematics import approach, difference, other, reduced_mass, relative_motion, surface_factor
 from grasp_ros.exact.numerics.roots import first_rise
 from grasp_ros.exact.records import Array, Deciding, Integers, Plant, State
 from grasp_ros.exact.tolerances import CLAMPS, DERIVATIVE, SHORT_START, SURFACE, TURNS
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.impact_law import EXPONENT
-from grasp_ros.physics.layout import OBJECT, Body, Law, Of, Pair, U, V, X
+from grasp_ros.physics.layout import OBJECT, Body, Law, Of, Pair, U
 
 LOWEST, NEXT, HIGHEST = (whole(order) for order in (2, 3, 6))  # int64: numba compiles anew for each literal
 LONGEST = RANGES["duration"].high  # s
@@ -109,15 +101,6 @@ def own_difference(plant: Plant, y: Array, side: Body) -> Deciding:
 
 
 @kernel
-def difference(plant: Plant, y: Array, side: Body, order: int) -> tuple[float, float]:
-    """A derivative of u without impact forces, and the sum of the sizes of its terms."""
-    x, v, sign = arm_of(y, side)
-    value, size = derivatives(plant.bodies[side], x, v, order)
-    value_o, size_o = derivatives(plant.bodies[OBJECT], y[X.O], y[V.O], order)
-    return sign * (value - value_o), size + size_o
-
-
-@kernel
 def write_own_series(plant: Plant, y: Array, side: Body, f: Array) -> float:
     """Write the series of u without impact forces up to the order HIGHEST; returns its first coefficient that is not 0.
 
@@ -132,21 +115,6 @@ def write_own_series(plant: Plant, y: Array, side: Body, f: Array) -> float:
         if f[k] != 0.0:
             return f[k]
     return 0.0
-
-
-@kernel
-def is_negligible(plant: Plant, side: Body, u: float, d: float, part: float) -> bool:
-    """Whether the impulse of a pair between u = 0 and u is below a part of mu u', with the reduced mass mu.
-
-    If the object sticks the force itself must be negligible, too: whether the object slips depends on it.
-    """
-    pair, d = plant.pairs[side], abs(d)
-    if u <= 0.0 or d == 0.0:
-        return u <= 0.0
-    force = elastic_force(pair[Law.HERTZIAN], u) * damping_factor(pair[Law.DISSIPATION], d)
-    if plant.bodies[OBJECT, Of.MASS] == math.inf and force > DERIVATIVE * plant.coulomb:
-        return False
-    return force * (u / d) <= part * reduced_mass(plant.bodies, side) * d
 
 
 @kernel

@@ -6,16 +6,8 @@ consistent where one begins, and `make_transitions` where it ends; `begin_interv
 
 from __future__ import annotations
 
-from grasp_ros.exact.automaton.begin import must_begin
-from grasp_ros.exact.automaton.edge import (
-    NEVER,
-    deciding_derivative,
-    glides,
-    has_glided,
-    is_negligible,
-    separates,
-    surface_side,
-)
+from grasp_ros.exact.automaton.begin import is_negligible, must_begin
+from grasp_ros.exact.automaton.edge import NEVER, deciding_derivative, glides, has_glided, separates, surface_side
 from grasp_ros.exact.automaton.friction import apply_friction, lift_friction, push_on_object
 from grasp_ros.exact.compensated import copy, meet, put, velocity_lane
 from grasp_ros.exact.compilation.jit import inlined, kernel
@@ -77,8 +69,9 @@ def begin_interval(plant: Plant, state: State, out: Output) -> None:
         initial_modes(plant, state)
         initial_slide(plant, state)
         initial_modes(plant, state)  # a pair at rest at u = 0 moves as friction lets it
-        record_first_touch(state, LEFT, out)
-        record_first_touch(state, RIGHT, out)
+        for side in (LEFT, RIGHT):  # a run that starts with a pair closed at u = 0 starts with its touch
+            if mode[side] == Pair.CONTACT and state.y[U.L + side] == 0.0:
+                record(state, side, Transition.TOUCH, 0.0, approach(state.y, side), out)
     if state.clock[0] > 0.0:
         apply_friction(plant, mode)
         return
@@ -87,13 +80,6 @@ def begin_interval(plant: Plant, state: State, out: Output) -> None:
         left, right = mode_at_tick(plant, state, LEFT), mode_at_tick(plant, state, RIGHT)
         settle(state, LEFT, left, out)
         settle(state, RIGHT, right, out)
-
-
-@inlined
-def record_first_touch(state: State, side: Body, out: Output) -> None:
-    """A run that starts with a pair closed at u = 0 starts with its touch."""
-    if state.mode[side] == Pair.CONTACT and state.y[U.L + side] == 0.0:
-        record(state, side, Transition.TOUCH, 0.0, approach(state.y, side), out)
 
 
 @inlined
@@ -163,18 +149,6 @@ def end_begin(state: State, side: Body, out: Output) -> None:
 
 
 @inlined
-def leave_gliding(plant: Plant, state: State) -> None:
-    """Make pairs LEAVING whose force has died out at u' = -1/p, and which nothing moves off it."""
-    mode = state.mode
-    left = mode[LEFT] == Pair.CONTACT and has_glided(plant, state, LEFT, SURFACE)
-    right = mode[RIGHT] == Pair.CONTACT and has_glided(plant, state, RIGHT, SURFACE)
-    if left:
-        mode[LEFT] = Pair.LEAVING
-    if right:
-        mode[RIGHT] = Pair.LEAVING
-
-
-@inlined
 def settle_pairs(plant: Plant, state: State, settings: Settings, out: Output) -> None:
     """Modes of the pairs that are consistent with where a segment begins."""
     settle_resting(plant, state, out)
@@ -186,9 +160,17 @@ def settle_pairs(plant: Plant, state: State, settings: Settings, out: Output) ->
 
 @inlined
 def let_leave(plant: Plant, state: State, settings: Settings) -> None:
-    """Make pairs LEAVING that glide, and both before a common release: w_l w_r = 0 stops regularised time."""
+    """Make pairs LEAVING that nothing moves off u' = -1/p, where the force has died out, both at once, for symmetry.
+
+    So are both before a common release: w_l w_r = 0 stops regularised time.
+    """
     mode, y = state.mode, state.y
-    leave_gliding(plant, state)
+    left = mode[LEFT] == Pair.CONTACT and has_glided(plant, state, LEFT, SURFACE)
+    right = mode[RIGHT] == Pair.CONTACT and has_glided(plant, state, RIGHT, SURFACE)
+    if left:
+        mode[LEFT] = Pair.LEAVING
+    if right:
+        mode[RIGHT] = Pair.LEAVING
     slipping = mode[OBJECT] in (Slide.RIGHTWARD, Slide.LEFTWARD) and y[V.O] == 0.0  # it needs their force
     if mode[LEFT] != Pair.CONTACT or mode[RIGHT] != Pair.CONTACT or slipping:
         return
@@ -225,7 +207,7 @@ def make_transition(plant: Plant, state: State, side: Body, kind: Transition, le
     A touch with u' <= 0 by rounding is that of a pair at rest: `settle_resting` decides. A CLAMP of a pair that glides
     at u' = -1/p, which it never passes, is rounding: the pair `leaves` without an event.
     """
-    y, mode, d = state.y, state.mode, approach(state.y, side)
+    y, mode, d, beside = state.y, state.mode, approach(state.y, side), other(side)
     if kind in (Transition.TOUCH, Transition.RELEASE):
         meet(state, side)  # the places agree but for rounding
     if kind == Transition.TOUCH and d <= 0.0:
@@ -234,21 +216,13 @@ def make_transition(plant: Plant, state: State, side: Body, kind: Transition, le
     if leaves:
         mode[side] = Pair.LEAVING
         return
-    if kind == Transition.TOUCH:
-        turn_back(state, side)
+    if kind == Transition.TOUCH and mode[beside] == Pair.LEAVING:
+        mode[beside] = Pair.CONTACT  # the force of this pair may turn it back
     if kind == Transition.CLAMP:
         mode[side] = Pair.CLAMPED
     else:
         mode[side] = Pair.OPEN if kind == Transition.RELEASE else Pair.CONTACT
     record(state, side, kind, y[U.L + side], d, out)
-
-
-@inlined
-def turn_back(state: State, side: Body) -> None:
-    """A pair that is leaving is in contact again where the other one, `side`, touches: its force may turn it back."""
-    beside = other(side)
-    if state.mode[beside] == Pair.LEAVING:
-        state.mode[beside] = Pair.CONTACT
 
 
 @kernel

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.automaton.begin import leaves_force_out, speed_of_pair
-from grasp_ros.exact.automaton.edge import LOWEST, deciding_derivative, difference, other_push
+from grasp_ros.exact.automaton.edge import LOWEST, deciding_derivative, other_push
 from grasp_ros.exact.automaton.friction import slide_in_contact
 from grasp_ros.exact.compensated import add, keep_together, move_arm_in_contact, move_in_flight
 from grasp_ros.exact.compilation.jit import inlined, kernel, whole
@@ -13,7 +13,7 @@ from grasp_ros.exact.contact.step_unit import new_step
 from grasp_ros.exact.contact.taylor_step import accepted_length, fitted_step
 from grasp_ros.exact.flight.closed_form import flights_of, fly
 from grasp_ros.exact.impact import damping_factor
-from grasp_ros.exact.kinematics import approach, is_resting, rate_lanes, surface_factor
+from grasp_ros.exact.kinematics import approach, difference, is_resting, rate_lanes, surface_factor
 from grasp_ros.exact.numerics.polynomial import invert_time, lane_range, values
 from grasp_ros.exact.numerics.powers_of_two import power_of_two
 from grasp_ros.exact.numerics.roots import first_rise
