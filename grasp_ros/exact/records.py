@@ -84,7 +84,7 @@ class Settings(NamedTuple):
     tolerance: float  # first neglected Taylor term, relative to the impact
     one: Order  # of a step with one pair in contact, unless the step is short
     both: Order  # of one with both
-    rate: float  # bound on the rates at which the bodies move by themselves, 1/s, see `step_unit.rate_bound`
+    rate: float  # power of two above the rates at which the bodies move by themselves, 1/s
 
 
 class Output(NamedTuple):

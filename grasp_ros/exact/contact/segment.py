@@ -7,52 +7,29 @@ import math
 from grasp_ros.exact.automaton.begin import leaves_force_out, speed_of_pair
 from grasp_ros.exact.automaton.edge import LOWEST, deciding_derivative, other_push
 from grasp_ros.exact.automaton.friction import slide_in_contact
-from grasp_ros.exact.compensated import add, keep_together, move_arm_in_contact, move_in_flight
-from grasp_ros.exact.compilation.jit import inlined, kernel, whole
-from grasp_ros.exact.contact.step_unit import new_step
-from grasp_ros.exact.contact.taylor_step import accepted_length, fitted_step
-from grasp_ros.exact.flight.closed_form import flights_of, fly
+from grasp_ros.exact.compensated import add, keep_together, move_arm_in_contact, move_in_flight, velocity_lane
+from grasp_ros.exact.compilation.jit import inlined, kernel
+from grasp_ros.exact.flight.closed_form import fly
 from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.kinematics import approach, difference, is_resting, rate_lanes, surface_factor
 from grasp_ros.exact.numerics.polynomial import invert_time, lane_range, values
 from grasp_ros.exact.numerics.powers_of_two import power_of_two
 from grasp_ros.exact.numerics.roots import first_rise
-from grasp_ros.exact.records import Array, Candidate, Ends, Flight, Integers, Plant, Segment, Settings, State, Tables
+from grasp_ros.exact.records import Array, Candidate, Ends, Flight, Integers, Plant, Segment, State, Tables
 from grasp_ros.exact.tolerances import BEYOND, CANCELS, DERIVATIVE, NOISE, SURFACE, TOGETHER
-from grasp_ros.physics.layout import (
-    EPS,
-    LANES,
-    LEFT,
-    OBJECT,
-    RIGHT,
-    Body,
-    Kind,
-    Lane,
-    Law,
-    Pair,
-    Slide,
-    Transition,
-    V,
-    Work,
-    X,
-    Z,
-)
+from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Pair, Slide, Transition, V, X, Z
 
-ALONE = whole(-1)  # no second lane
 MOST_HALVINGS = 64  # of a step
 
 
 @inlined
-def rise_of_lanes(tables: Tables, n: int, h: float, factor: float, front: int, back: int, offset: float, work: Integers
-                  ) -> float:
-    """First s in (0, h] at which offset + factor (c_front - c_back) rises through zero; back < 0: without it."""
-    c, row = tables.c, tables.row
+def rise_of_rate(tables: Tables, n: int, h: float, factor: float, side: Body, offset: float, work: Integers) -> float:
+    """First s in (0, h] at which offset + factor u' of a pair rises through zero."""
+    c, row, (front, back) = tables.c, tables.row, rate_lanes(side)
     for k in range(n + 1):
-        i = LANES * k
-        row[k] = factor * (c[i + front] - c[i + back] if back >= 0 else c[i + front])
+        row[k] = factor * (c[LANES * k + front] - c[LANES * k + back])
     row[0] += offset
-    noise = abs(c[front]) + abs(c[back]) if back >= 0 else abs(c[front])
-    return first_rise(row, n, h, EPS * (abs(offset) + abs(factor) * noise), work)
+    return first_rise(row, n, h, EPS * (abs(offset) + abs(factor) * (abs(c[front]) + abs(c[back]))), work)
 
 
 @inlined
@@ -70,10 +47,10 @@ def pair_candidate(tables: Tables, plant: Plant, state: State, n: int, side: Bod
     if mode == Pair.OPEN:
         if c[z] <= 0.0 and high < 0.0:
             return Candidate(math.inf, Transition.TOUCH)
-        return Candidate(touch_of_open(tables, plant, state, n, side, h, work), Transition.TOUCH)
+        return Candidate(crossing_of_depth(tables, plant, state, n, side, h, work), Transition.TOUCH)
     released = math.inf
     if not (c[z] >= 0.0 and low > 0.0):
-        released = rise_of_lanes(tables, n, h, -1.0, z, ALONE, 0.0, work)
+        released = crossing_of_depth(tables, plant, state, n, side, h, work)
         if math.isnan(released):
             return Candidate(released, Transition.RELEASE)
     crossed, kind = surface_candidate(tables, plant, state, n, side, min(h, released), work)
@@ -81,15 +58,16 @@ def pair_candidate(tables: Tables, plant: Plant, state: State, n: int, side: Bod
 
 
 @kernel
-def touch_of_open(tables: Tables, plant: Plant, state: State, n: int, side: Body, h: float, work: Integers) -> float:
-    """First s in (0, h] at which u of a pair without contact rises through zero.
+def crossing_of_depth(tables: Tables, plant: Plant, state: State, n: int, side: Body, h: float, work: Integers
+                      ) -> float:
+    """First s in (0, h] at which u of an open pair rises through zero, or w or u of a closed one falls.
 
     Where a pair at u = u' = 0 opens, coefficients that say otherwise before the one that opens it are roundings.
     """
-    row = tables.row
+    row, is_open = tables.row, state.mode[side] == Pair.OPEN
     for k in range(n + 1):
-        row[k] = tables.c[LANES * k + Z.L + side]
-    if is_resting(state.y, side) and deciding_derivative(plant, state, side).value < 0.0:
+        row[k] = tables.c[LANES * k + Z.L + side] if is_open else -tables.c[LANES * k + Z.L + side]
+    if is_open and is_resting(state.y, side) and deciding_derivative(plant, state, side).value < 0.0:
         for k in range(n + 1):
             if row[k] < 0.0:
                 break
@@ -110,9 +88,9 @@ def surface_candidate(tables: Tables, plant: Plant, state: State, n: int, side: 
             return math.inf, Transition.CLAMP
         beyond = BEYOND * EPS * damping_factor(loss, abs(c[front]) + abs(c[back]))
         offset = -1.0 - beyond if surface_factor(plant.pairs, state.y, side, SURFACE) == 0.0 else -1.0
-        return rise_of_lanes(tables, n, h, -loss, front, back, offset, work), Transition.CLAMP
+        return rise_of_rate(tables, n, h, -loss, side, offset, work), Transition.CLAMP
     if mode == Pair.CLAMPED:
-        return rise_of_lanes(tables, n, h, loss, front, back, 1.0, work), Transition.REENTRY
+        return rise_of_rate(tables, n, h, loss, side, 1.0, work), Transition.REENTRY
     return math.inf, Transition.CLAMP
 
 
@@ -128,24 +106,6 @@ def is_blurred(tables: Tables, plant: Plant, n: int, side: Body, candidate: Cand
 
 
 @inlined
-def clear_end(tables: Tables, plant: Plant, n: int, left: Candidate, right: Candidate, h: float) -> float:
-    """End of a step of length h by its pairs: at their first event, or half-way to it if it `is_blurred`."""
-    s = min(h, left.when, right.when)
-    if s < h and (is_blurred(tables, plant, n, LEFT, left, s) or is_blurred(tables, plant, n, RIGHT, right, s)):
-        s *= 0.5
-    return s
-
-
-@inlined
-def press(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, work: Integers) -> Segment:
-    """One Taylor step as far as it is exact; its series and the values at its end stand in the tables."""
-    work[Work.CONTACT_STEPS] += 1
-    step, h = fitted_step(tables, plant, state, settings, new_step(plant, state, settings, span), span)
-    h = accepted_length(tables, step, h, settings, work)
-    return Segment(Kind.CONTACT, tables.at[Lane.TIME], h, step, flights_of(plant, state.y, step.left, step.right))
-
-
-@inlined
 def step_ends(tables: Tables, plant: Plant, state: State, segment: Segment, work: Integers) -> Ends:
     """First events of the pairs and of the object within a step, in its variable."""
     n, h = segment.step.order.number, segment.s
@@ -154,7 +114,9 @@ def step_ends(tables: Tables, plant: Plant, state: State, segment: Segment, work
     slide = Candidate(math.inf, Slide.FREE)
     if math.isnan(h) or math.isnan(left.when) or math.isnan(right.when):
         return Ends(left, right, slide, math.nan)
-    s = clear_end(tables, plant, n, left, right, h)
+    s = min(h, left.when, right.when)
+    if s < h and (is_blurred(tables, plant, n, LEFT, left, s) or is_blurred(tables, plant, n, RIGHT, right, s)):
+        s *= 0.5
     if state.mode[OBJECT] != Slide.FREE:
         if s < h:
             values(tables.c, n, s, tables.at)
@@ -223,13 +185,13 @@ def may_last(plant: Plant, state: State, side: Body, at: Array, blurred: float) 
 
 
 @inlined
-def has_not_begun(plant: Plant, state: State, side: Body, at: Array, flight: Flight) -> bool:
-    """Whether arm and object of a pair that begins at rest have moved alike in a step, but for the rounding of u''.
+def moves_alike(plant: Plant, state: State, side: Body, at: Array, flight: Flight) -> bool:
+    """Whether arm and object of a pair at rest have moved alike in a step, but for the rounding of u'' if it begins.
 
     Their changes are compared: these have smaller roundings.
     """
     if state.mode[side] != Pair.BEGINNING or not is_resting(state.y, side):
-        return False
+        return state.mode[side] == Pair.RESTING
     flown, least, way = fly(flight, at[Lane.TIME]), blur(plant, state, side) * at[Lane.TIME], at[LANES + X.O]
     return bool(abs(flown.change - at[LANES + V.O]) <= least
                 and abs(flown.way - way) <= least * at[Lane.TIME] + 2.0 * EPS * abs(way))
@@ -238,25 +200,19 @@ def has_not_begun(plant: Plant, state: State, side: Body, at: Array, flight: Fli
 @inlined
 def move_by_step(tables: Tables, plant: Plant, segment: Segment, state: State) -> None:
     """Move the state to the end of a step, whose values are in `tables.at`; pairs that move alike stay at u = 0."""
-    at, (left, right, _) = tables.at, segment.flights
-    alike_l = state.mode[LEFT] == Pair.RESTING or has_not_begun(plant, state, LEFT, at, left)
-    alike_r = state.mode[RIGHT] == Pair.RESTING or has_not_begun(plant, state, RIGHT, at, right)
+    at, step, (left, right, _) = tables.at, segment.step, segment.flights
+    alike_l, alike_r = moves_alike(plant, state, LEFT, at, left), moves_alike(plant, state, RIGHT, at, right)
     add(state, X.O, at[LANES + X.O])
     add(state, V.O, at[LANES + V.O])
-    if segment.step.left:
-        move_arm_in_contact(state, LEFT, at[LANES + X.O], at[Z.L], at[LANES + Z.L])
-        add(state, V.L, at[LANES + V.L])
-    else:
-        move_in_flight(state, LEFT, fly(left, segment.t))
-    if segment.step.right:
-        move_arm_in_contact(state, RIGHT, at[LANES + X.O], at[Z.R], at[LANES + Z.R])
-        add(state, V.R, at[LANES + V.R])
-    else:
-        move_in_flight(state, RIGHT, fly(right, segment.t))
-    if alike_l:
-        keep_together(state, LEFT)
-    if alike_r:
-        keep_together(state, RIGHT)
+    for side, pushed, flight, alike in ((LEFT, step.left, left, alike_l), (RIGHT, step.right, right, alike_r)):
+        if pushed:
+            v, z = velocity_lane(side), Z.L + side
+            move_arm_in_contact(state, side, at[LANES + X.O], at[z], at[LANES + z])
+            add(state, v, at[LANES + v])
+        else:
+            move_in_flight(state, side, fly(flight, segment.t))
+        if alike:
+            keep_together(state, side)
 
 
 @inlined

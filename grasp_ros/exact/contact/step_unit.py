@@ -63,24 +63,17 @@ def order_for(tolerance: float, highest: Order, reach: float) -> Order:
 
 
 @kernel
-def rate_bound(bodies: Array) -> float:
-    """Power of two above the rates, in 1/s, at which the bodies (3, 4) move by themselves."""
-    rate = 0.0
-    for i in range(3):
-        body = bodies[i]
-        rate = max(rate, abs(body[Of.DAMPING]) / body[Of.MASS], math.sqrt(body[Of.STIFFNESS] / body[Of.MASS]))
-    return power_of_two_root(rate, 1)
-
-
-@kernel
 def new_settings(tolerance: float, highest: int, given: Array) -> Settings:
     """Settings of a run; the workspace holds series up to the order `highest`, that of steps with both pairs.
 
     Their terms must be small at 2/3 of the order with one pair already, see `taylor_step.step_size`.
     """
-    one = lower_order(highest)
+    one, rate = lower_order(highest), 0.0
+    for i in range(3):
+        body = given[i]
+        rate = max(rate, abs(body[Of.DAMPING]) / body[Of.MASS], math.sqrt(body[Of.STIFFNESS] / body[Of.MASS]))
     both = new_order(tolerance, highest, max(lower_order(one), LEAST))
-    return Settings(tolerance, new_order(tolerance, one, one), both, rate_bound(given))
+    return Settings(tolerance, new_order(tolerance, one, one), both, power_of_two_root(rate, 1))
 
 
 @inlined

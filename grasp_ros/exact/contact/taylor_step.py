@@ -11,13 +11,15 @@ import math
 from grasp_ros.exact.compilation.jit import inlined
 from grasp_ros.exact.compilation.vectors import highest, larger, load, numbers_of, sizes
 from grasp_ros.exact.contact.series import FIRST, expand_both, expand_one, scale_of, store_eight
+from grasp_ros.exact.contact.step_unit import new_step
+from grasp_ros.exact.flight.closed_form import flights_of
 from grasp_ros.exact.kinematics import own_size
 from grasp_ros.exact.numerics.polynomial import INVERSE, curvatures, values
 from grasp_ros.exact.numerics.powers_of_two import near_exp2, near_inverse, near_log2, orders_to_one, power_of_two
-from grasp_ros.exact.records import Array, Integers, Lanes, Order, Plant, Settings, State, Step, Tables
+from grasp_ros.exact.records import Array, Integers, Lanes, Order, Plant, Segment, Settings, State, Step, Tables
 from grasp_ros.exact.tolerances import DEFECT, STILL
 from grasp_ros.physics.impact_law import STORED_ROOT
-from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Lane, Pair, U, V, Work, X, Z
+from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Kind, Lane, Pair, U, V, Work, X, Z
 
 TAIL = STORED_ROOT  # at a touch with p = 0 all coefficients between multiples of it are zero
 SMALLEST = 1e-290  # of a change
@@ -72,10 +74,9 @@ def begin_series(tables: Tables, state: State) -> None:
     for lane in range(LANES):
         c[lane] = y[lane]
     c[Lane.TIME] = 0.0
-    if mode[LEFT] == Pair.CONTACT:
-        c[Z.L] = math.sqrt(max(y[U.L], 0.0))
-    if mode[RIGHT] == Pair.CONTACT:
-        c[Z.R] = math.sqrt(max(y[U.R], 0.0))
+    for side in (LEFT, RIGHT):
+        if mode[side] == Pair.CONTACT:
+            c[Z.L + side] = math.sqrt(max(y[U.L + side], 0.0))
 
 
 @inlined
@@ -192,3 +193,12 @@ def accepted_length(tables: Tables, step: Step, h: float, settings: Settings, wo
         work[Work.REJECTED_STEPS] += 1
         h *= 0.7
     return math.nan
+
+
+@inlined
+def press(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, work: Integers) -> Segment:
+    """One Taylor step as far as it is exact; its series and the values at its end stand in the tables."""
+    work[Work.CONTACT_STEPS] += 1
+    step, h = fitted_step(tables, plant, state, settings, new_step(plant, state, settings, span), span)
+    h = accepted_length(tables, step, h, settings, work)
+    return Segment(Kind.CONTACT, tables.at[Lane.TIME], h, step, flights_of(plant, state.y, step.left, step.right))

@@ -12,14 +12,15 @@ from typing import Any
 from grasp_ros.exact.automaton.modes import make_transitions, settle_pairs
 from grasp_ros.exact.compensated import tick, until, write_penetrations
 from grasp_ros.exact.compilation.jit import door, inlined
-from grasp_ros.exact.contact.segment import cut_step, move_by_step, press, state_in_step, step_ends
+from grasp_ros.exact.contact.segment import cut_step, move_by_step, state_in_step, step_ends
 from grasp_ros.exact.contact.step_unit import new_settings, within_decay
+from grasp_ros.exact.contact.taylor_step import press
 from grasp_ros.exact.driver.callback import notify, notify_rest
 from grasp_ros.exact.driver.energy_check import check_segment, energy_level
 from grasp_ros.exact.driver.intervals import answer_end, close_interval, enter_interval, open_interval, rest
 from grasp_ros.exact.driver.outputs import due, may_go_on, write_reached, write_row
 from grasp_ros.exact.driver.rest import SINCE, keep_scale, rests
-from grasp_ros.exact.flight.segment import cut_flight, flight_ends, fly_free, move_by_flight, state_in_flight
+from grasp_ros.exact.flight.segment import flight_ends, fly_free, move_by_flight, state_in_flight
 from grasp_ros.exact.records import (
     Array,
     Ends,
@@ -52,7 +53,7 @@ def next_segment(tables: Tables, plant: Plant, state: State, settings: Settings,
         return cut_step(tables, plant, state, segment, ends, span), ends
     segment = fly_free(plant, state, span, work)
     ends = flight_ends(tables.row, plant, state, segment, work)
-    return cut_flight(segment, ends), ends
+    return Segment(segment.kind, ends.known, ends.known, segment.step, segment.flights), ends
 
 
 @inlined

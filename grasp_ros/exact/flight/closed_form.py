@@ -9,11 +9,12 @@ import math
 
 from grasp_ros.exact.compilation.jit import inlined, kernel, whole
 from grasp_ros.exact.numerics.polynomial import INVERSE
-from grasp_ros.exact.records import Array, Flight, Flights, Flown, Plant, Regime
+from grasp_ros.exact.records import Array, Flight, Flights, Flown, Order, Plant, Regime, Step
 from grasp_ros.exact.tolerances import FAR, FAR_SHORT, SETTLED, SHORT_FLIGHT
-from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Of, V, X
+from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Of, V, X
 
 FLIGHT_ORDER = whole(16)  # (1/2)^16 / 16! is below rounding; typed, or numba compiles its users once more
+NO_STEP = Step(Order(0, 1.0, 0), 1.0, False, False)  # of a segment that is a flight
 
 
 @kernel
@@ -126,22 +127,15 @@ def expand_flight(bodies: Array, flights: Flights, t: float, c: Array) -> None:
     """
     for i in range(LANES):
         c[i] = 0.0
-    expand_body(bodies, LEFT, flights.left, t, c)
-    expand_body(bodies, OBJECT, flights.object, t, c)
-    expand_body(bodies, RIGHT, flights.right, t, c)
-
-
-@kernel
-def expand_body(bodies: Array, body: Body, flight: Flight, t: float, c: Array) -> None:
-    """Write the Taylor coefficients of one body's position and velocity."""
-    row, lane = bodies[body], X.O if body == OBJECT else (X.L if body == LEFT else X.R)
-    m = row[Of.MASS]
-    force, k, d = row[Of.FORCE] / m, row[Of.STIFFNESS] / m, row[Of.DAMPING] / m
-    x, v, _, _ = fly(flight, t)
-    c[lane], c[lane + 1] = x, v
-    for n in range(FLIGHT_ORDER):
-        share = 1.0 / (n + 1)
-        x, v = share * v, share * ((force - k * x) - d * v)
-        force = 0.0
-        i = LANES * (n + 1) + lane
-        c[i], c[i + 1] = x, v
+    for body, lane, flight in ((LEFT, X.L, flights.left), (OBJECT, X.O, flights.object), (RIGHT, X.R, flights.right)):
+        row = bodies[body]
+        m = row[Of.MASS]
+        force, k, d = row[Of.FORCE] / m, row[Of.STIFFNESS] / m, row[Of.DAMPING] / m
+        x, v, _, _ = fly(flight, t)
+        c[lane], c[lane + 1] = x, v
+        for n in range(FLIGHT_ORDER):
+            share = 1.0 / (n + 1)
+            x, v = share * v, share * ((force - k * x) - d * v)
+            force = 0.0
+            i = LANES * (n + 1) + lane
+            c[i], c[i + 1] = x, v

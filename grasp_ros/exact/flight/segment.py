@@ -9,30 +9,15 @@ from grasp_ros.exact.automaton.edge import NEVER, own_difference, parting_time
 from grasp_ros.exact.automaton.friction import slide_in_flight
 from grasp_ros.exact.compensated import keep_together, move_in_flight
 from grasp_ros.exact.compilation.jit import inlined, kernel
-from grasp_ros.exact.flight.closed_form import FLIGHT_ORDER, expand_flight, flights_of, fly, settling_time
+from grasp_ros.exact.flight.closed_form import FLIGHT_ORDER, NO_STEP, expand_flight, flights_of, fly, settling_time
 from grasp_ros.exact.flight.search import first_root, motion_at, pair_in_flight
 from grasp_ros.exact.kinematics import approach, arm_of, is_resting, next_derivative, own_acceleration
 from grasp_ros.exact.numerics.polynomial import values
-from grasp_ros.exact.records import (
-    Array,
-    Candidate,
-    Ends,
-    Flights,
-    Integers,
-    Motion,
-    Order,
-    Plant,
-    Segment,
-    Settings,
-    State,
-    Step,
-    Tables,
-)
+from grasp_ros.exact.records import Array, Candidate, Ends, Integers, Motion, Plant, Segment, Settings, State, Tables
 from grasp_ros.exact.tolerances import TOGETHER
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Kind, Of, Pair, Transition, U, V, Work, X
 
 STEEP = 1e16  # rate in 1/s whose powers leave the range of numbers
-NO_STEP = Step(Order(0, 1.0, 0), 1.0, False, False)
 
 
 @inlined
@@ -52,19 +37,19 @@ def is_far(plant: Plant, y: Array, side: Body, span: float) -> bool:
 
 
 @kernel
-def pair_candidate(row: Array, plant: Plant, state: State, flights: Flights, side: Body, span: float, until: float,
-                   work: Integers) -> tuple[Candidate, float]:
-    """First event of one pair in a flight of at most `span` seconds, unless it is later than `until`.
+def pair_candidate(row: Array, plant: Plant, state: State, flight: Segment, side: Body, until: float, work: Integers
+                   ) -> tuple[Candidate, float]:
+    """First event of one pair in a flight, unless it is later than `until`.
 
     The second value is the time at which `first_root` gave up.
     """
-    mode, y = state.mode[side], state.y
+    mode, y, span = state.mode[side], state.y, flight.t
     if mode in (Pair.RESTING, Pair.ABSENT, Pair.BEGINNING):
         return Candidate(math.inf, Transition.TOUCH), math.inf
     if mode == Pair.OPEN and is_far(plant, y, side, span):
         work[Work.ROOT_ITERATIONS] += 1
         return Candidate(math.inf, Transition.TOUCH), math.inf
-    pair = pair_in_flight(plant, y, flights, side)
+    pair = pair_in_flight(plant, y, flight.flights, side)
     t, d = 0.0, approach(y, side)
     at = Motion(pair.arm_flight.x, pair.arm_flight.v, pair.body_flight.x, pair.body_flight.v, pair.u, d, abs(pair.u))
     if pair.u == 0.0 and d == 0.0:
@@ -101,20 +86,13 @@ def flight_ends(row: Array, plant: Plant, state: State, segment: Segment, work: 
 
     `row` is scratch.
     """
-    span, flights = segment.t, segment.flights
-    left, known_l = pair_candidate(row, plant, state, flights, LEFT, span, math.inf, work)
-    right, known_r = pair_candidate(row, plant, state, flights, RIGHT, span, TOGETHER * left.when, work)
+    left, known_l = pair_candidate(row, plant, state, segment, LEFT, math.inf, work)
+    right, known_r = pair_candidate(row, plant, state, segment, RIGHT, TOGETHER * left.when, work)
     slide = slide_in_flight(plant, state)
     if math.isnan(left.when) or math.isnan(right.when):
         return Ends(left, right, slide, math.nan)
     begun = min(force_free_time(row, plant, state, LEFT), force_free_time(row, plant, state, RIGHT))
-    return Ends(left, right, slide, min(span, left.when, right.when, slide.when, known_l, known_r, begun))
-
-
-@inlined
-def cut_flight(segment: Segment, ends: Ends) -> Segment:
-    """A flight until its first event, or as far as it is known."""
-    return Segment(segment.kind, ends.known, ends.known, segment.step, segment.flights)
+    return Ends(left, right, slide, min(segment.t, left.when, right.when, slide.when, known_l, known_r, begun))
 
 
 @inlined

@@ -20,23 +20,17 @@ INVERSE = np.array([0.0, *(1.0 / n for n in range(1, 100))])  # a quotient would
 
 
 @inlined
-def ways(c: Array, n: int, s: float) -> Array:
-    """Changes of the lanes from 0 to s, of the even degree n."""
-    square = s * s
-    even, odd = load(c, LANES * n), load(c, LANES * (n - 1))
-    for k in range(n - 2, 0, -2):
-        even = add_product(load(c, LANES * k), even, square)
-        odd = add_product(load(c, LANES * (k - 1)), odd, square)
-    return add_product(odd, even, s) * s
-
-
-@inlined
 def values(c: Array, n: int, s: float, at: Array) -> None:
     """Write the lanes' values at s, of the even degree n, to `at` (2 LANES,), and behind them their changes.
 
     The constant comes last and is rounded with one sum, so that many short steps lose nothing systematically.
     """
-    way = ways(c, n, s)
+    square = s * s
+    even, odd = load(c, LANES * n), load(c, LANES * (n - 1))
+    for k in range(n - 2, 0, -2):
+        even = add_product(load(c, LANES * k), even, square)
+        odd = add_product(load(c, LANES * (k - 1)), odd, square)
+    way = add_product(odd, even, s) * s
     store(at, 0, way + load(c, 0))
     store(at, LANES, way)
 

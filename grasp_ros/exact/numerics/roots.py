@@ -79,16 +79,6 @@ def root_of_rise(f: Array, n: int, low: float, high: float, noise: float, work: 
 
 
 @kernel
-def without_zeros(f: Array, n: int) -> int:
-    """Divide a polynomial by s^2 for as long as value and slope at 0 are zero, which changes no later sign."""
-    while n > 1 and f[0] == 0.0 and f[1] == 0.0:
-        n -= 2
-        for k in range(n + 1):
-            f[k] = f[k + 2]
-    return n
-
-
-@kernel
 def shift(f: Array, n: int, s: float) -> None:
     """Expand a polynomial of degree n about s instead of 0: synthetic division, again and again."""
     for first in range(n):
@@ -107,7 +97,10 @@ def first_rise(f: Array, n: int, h: float, noise: float, work: Integers) -> floa
     reached. f is overwritten.
     """
     degree = n
-    n = without_zeros(f, n)
+    while n > 1 and f[0] == 0.0 and f[1] == 0.0:  # divide it by s^2, which changes no later sign
+        n -= 2
+        for k in range(n + 1):
+            f[k] = f[k + 2]
     if (n < degree and f[0] > 0.0) or (n > 0 and f[0] > noise and f[1] > 0.0):
         return EPS * EPS * h
     begin, last = 0.0, 0.0
