@@ -84,16 +84,6 @@ def event_series(kind: Transition, pair: PairFlight, at: Motion, own: Derivative
 
 
 @inlined
-def event_bounds(kind: Transition, pair: PairFlight, own: Derivatives, body: Derivatives, left: float
-                 ) -> tuple[float, float]:
-    """Bounds on the second and the third derivative of g for `left` seconds."""
-    third = relative_bound(pair, own.third, own.fourth, body.third, body.fourth, left)
-    if kind == Transition.REENTRY:
-        return third, relative_bound(pair, own.fourth, own.fifth, body.fourth, body.fifth, left)
-    return relative_bound(pair, own.second, own.third, body.second, body.third, left), third
-
-
-@inlined
 def relative_bound(pair: PairFlight, q: float, q_rate: float, q_o: float, q_o_rate: float, left: float) -> float:
     """Bound on the difference of a derivative q of the arm's flight and q_o of the object's for `left` seconds."""
     if pair.alike:
@@ -197,7 +187,11 @@ def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: f
         g = event_series(kind, pair, at, own, body)
         if g.value >= -g.noise and g.rate > 0.0:
             return t, math.inf
-        curvature, growth = event_bounds(kind, pair, own, body, left)
+        third = relative_bound(pair, own.third, own.fourth, body.third, body.fourth, left)
+        if kind == Transition.REENTRY:  # bounds on the second and the third derivative of g for `left` seconds
+            curvature, growth = third, relative_bound(pair, own.fourth, own.fifth, body.fourth, body.fifth, left)
+        else:
+            curvature, growth = relative_bound(pair, own.second, own.third, body.second, body.third, left), third
         reach = reach_of_root(g, growth, left)
         if reach > 0.0:
             return root_between(kind, pair, t, t + reach, g, growth, work), math.inf
