@@ -15,7 +15,7 @@ from grasp_ros.exact.compilation.jit import door, inlined
 from grasp_ros.exact.contact.segment import cut_step, move_by_step, state_in_step, step_ends
 from grasp_ros.exact.contact.step_unit import new_settings, within_decay
 from grasp_ros.exact.contact.taylor_step import press
-from grasp_ros.exact.driver.callback import notify, notify_rest
+from grasp_ros.exact.driver.callback import REST, notify, tell
 from grasp_ros.exact.driver.energy_check import check_segment, energy_level
 from grasp_ros.exact.driver.intervals import answer_end, close_interval, enter_interval, open_interval, rest
 from grasp_ros.exact.driver.outputs import due, may_go_on, write_reached, write_row
@@ -145,7 +145,7 @@ def advance(
             return outcome.value
         settle_pairs(plant, state, settings, out)
         if rests(plant, state):
-            notify_rest(out.observer, span)
+            tell(out.observer, REST, span)
             rest(state, loop)
             continue
         state.rest[SINCE] = math.inf  # a segment moves on

@@ -27,8 +27,7 @@ from grasp_ros.exact.records import Integers, Segment, Tables
 ADDRESS, CONTEXT = 0, 1  # places of an observer
 FINISH, REST = -1, -3  # in place of a kind of segment: after a run, and where nothing moves in an interval
 SIGNATURE = int64(int64, int64, float64, float64, float64, int64)  # of an observer, see `notify`
-_FUNCTIONS: dict[int, Any] = {}  # where nothing is compiled
-_RECORDS: dict[int, Any] = {}  # likewise
+_PLAIN: dict[int, Any] = {}  # where nothing is compiled: functions and records by their addresses
 
 
 class Reference(Type):
@@ -61,14 +60,14 @@ def _field(_: Any, builder: Any, reference: Reference, address: Any, name: str) 
 @instruction(lambda _, address, context, kind, t, s, unit, degree: (int64(int64, *SIGNATURE.args), code_of_call))
 def call(address: int, context: int, kind: int | np.int64, t: float, s: float, unit: float, degree: int) -> int:
     """Call the observer at an address."""
-    return int(_FUNCTIONS[int(address)](int(context), kind, t, s, unit, degree))
+    return int(_PLAIN[int(address)](int(context), kind, t, s, unit, degree))
 
 
 @cache
 def address_of(function: Any) -> int:
     """Address of an observer, which is compiled where it has not been; where nothing is, a number that `call` knows."""
     if not COMPILED:
-        _FUNCTIONS[id(function)] = function
+        _PLAIN[id(function)] = function
         return id(function)
     function.compile(SIGNATURE)
     (result,) = function.overloads.values()
@@ -81,8 +80,8 @@ def block_of(record: Any) -> Integers:
     block = np.array([word for part in record for word in (
         0, 0, part.size, part.itemsize, part.ctypes.data, *part.shape, *part.strides)])
     if not COMPILED:
-        _RECORDS[block.ctypes.data] = record
-        finalize(block, _RECORDS.pop, block.ctypes.data)
+        _PLAIN[block.ctypes.data] = record
+        finalize(block, _PLAIN.pop, block.ctypes.data)
     return block
 
 
@@ -93,16 +92,16 @@ def reader(kind: Any) -> Any:
 
     @instruction(lambda _, address: (Reference(kind)(int64), code))
     def read(address: int) -> Any:
-        return _RECORDS[int(address)]
+        return _PLAIN[int(address)]
 
     return read
 
 
 @inlined
-def notify_rest(observer: Integers, span: float) -> None:
-    """Call the observer where nothing moves, with how long that lasts in s: to the end of an interval."""
+def tell(observer: Integers, kind: int, number: float) -> None:
+    """Call the observer with another kind than that of a segment; with REST: how long nothing moves, in s."""
     if observer[ADDRESS] != 0:
-        call(observer[ADDRESS], observer[CONTEXT], REST, span, 0.0, 0.0, 0)
+        call(observer[ADDRESS], observer[CONTEXT], kind, number, 0.0, 0.0, 0)
 
 
 @inlined

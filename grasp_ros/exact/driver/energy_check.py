@@ -84,13 +84,6 @@ def penetrates(plant: Plant, state: State, side: Body, before: float, size: floa
 
 
 @inlined
-def is_outside(y: Array) -> bool:
-    """Whether a body is farther away, or faster, than the domain allows."""
-    return bool(max(abs(y[X.L]), abs(y[X.O]), abs(y[X.R])) > LARGEST_POSITION
-                or max(abs(y[V.L]), abs(y[V.O]), abs(y[V.R])) > LARGEST_SPEED)
-
-
-@inlined
 def check_segment(plant: Plant, state: State, settings: Settings, before: Level, after: Level, t: float, idle: int,
                   modes: tuple[int, int]) -> Outcome:
     """Whether a segment of t s, which began with both pairs in `modes`, can be believed.
@@ -98,10 +91,11 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
     It must be finite, within the domain, not stalled, without a touch that was missed, and its energy may neither rise
     nor fall by more than rounding and losses explain. Where a feedback drives an arm (c + Kv < 0) energy may come.
     """
-    rise, size = after.value - before.value, max(after.size, before.size)
-    if not math.isfinite(state.y.sum()):
+    y, rise, size = state.y, after.value - before.value, max(after.size, before.size)
+    if not math.isfinite(y.sum()):
         return Outcome.NOT_FINITE
-    if is_outside(state.y):
+    if (max(abs(y[X.L]), abs(y[X.O]), abs(y[X.R])) > LARGEST_POSITION
+            or max(abs(y[V.L]), abs(y[V.O]), abs(y[V.R])) > LARGEST_SPEED):
         return Outcome.OUTSIDE
     if idle > MAX_IDLE:
         return Outcome.STALLED

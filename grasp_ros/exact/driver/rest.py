@@ -26,19 +26,6 @@ def keep_scale(state: State, begin: Level) -> None:
     rest[LENGTH] = max(rest[LENGTH], abs(y[X.L]), abs(y[X.O]), abs(y[X.R]))
 
 
-@inlined
-def may_rest(plant: Plant, state: State) -> bool:
-    """Whether no body moves any more: what most segments need to know, for less.
-
-    A motion may begin without energy; then the energy that a spring holds is the scale.
-    """
-    y, given = state.y, plant.given
-    held = max(given[LEFT, Of.STIFFNESS] * y[X.L] * y[X.L], given[RIGHT, Of.STIFFNESS] * y[X.R] * y[X.R])
-    most = REST * REST * max(state.rest[ENERGY], held)
-    return bool(given[LEFT, Of.MASS] * y[V.L] * y[V.L] <= most and given[RIGHT, Of.MASS] * y[V.R] * y[V.R] <= most
-                and given[OBJECT, Of.MASS] * y[V.O] * y[V.O] <= most)
-
-
 @kernel
 def stays(plant: Plant, state: State, body: Body) -> bool:
     """Whether a body stays where it is, but for a part REST of the largest position.
@@ -66,6 +53,14 @@ def stays(plant: Plant, state: State, body: Body) -> bool:
 
 @inlined
 def rests(plant: Plant, state: State) -> bool:
-    """Whether everything is at rest for as long as the inputs stay the same."""
-    return (may_rest(plant, state) and stays(plant, state, LEFT) and stays(plant, state, OBJECT)
-            and stays(plant, state, RIGHT))
+    """Whether everything is at rest for as long as the inputs stay the same.
+
+    That no body moves any more comes first: most segments need to know no more. A motion may begin without energy; then
+    the energy that a spring holds is the scale.
+    """
+    y, given = state.y, plant.given
+    held = max(given[LEFT, Of.STIFFNESS] * y[X.L] * y[X.L], given[RIGHT, Of.STIFFNESS] * y[X.R] * y[X.R])
+    most = REST * REST * max(state.rest[ENERGY], held)
+    return (given[LEFT, Of.MASS] * y[V.L] * y[V.L] <= most and given[RIGHT, Of.MASS] * y[V.R] * y[V.R] <= most
+            and given[OBJECT, Of.MASS] * y[V.O] * y[V.O] <= most
+            and stays(plant, state, LEFT) and stays(plant, state, OBJECT) and stays(plant, state, RIGHT))

@@ -1,4 +1,4 @@
-"""Scratch memory of the kernels: each run borrows its own, so that runs can be concurrent."""
+"""Memory of the kernels. Scratch: each run borrows its own, so that runs can be concurrent. Blocks: as records."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from grasp_ros.exact.compilation.jit import inlined
 from grasp_ros.exact.contact.step_unit import higher_order, series_order
 from grasp_ros.exact.flight.closed_form import FLIGHT_ORDER
-from grasp_ros.exact.records import Array, Tables, numbers_of_tables, tables_of
+from grasp_ros.exact.records import Array, Tables, numbers_of_tables, plant_of, state_of, tables_of
 
 EVENT_ROWS = 1024
 CACHE_LINE = 8  # numbers
+plant_in, state_in, tables_in = inlined(plant_of), inlined(state_of), inlined(tables_of)
 
 
 def zeros(*shape: int) -> Array:
