@@ -18,7 +18,7 @@ from grasp_ros.exact.compensated import write_penetrations
 from grasp_ros.exact.compilation.jit import address_of_code, kernel
 from grasp_ros.exact.compilation.jit import door as machine_door
 from grasp_ros.exact.driver.advance import advance
-from grasp_ros.exact.driver.callback import ADDRESS, CONTEXT, FINISH, call
+from grasp_ros.exact.driver.callback import ADDRESS, FINISH, tell
 from grasp_ros.exact.driver.workspace import workspace
 from grasp_ros.exact.integrator import BREATH, compile_kernels
 from grasp_ros.exact.records import COULOMB, Array, Integers, Loop, Output, Plant, State, new_run, one_interval
@@ -64,12 +64,6 @@ class Limits(NamedTuple):
     horizons: int  # that a row may go on until V_c decides whether it has settled
 
 
-def _takes_own_arrays(result: Any) -> bool:
-    """Whether machine code is for arrays as they are here; somebody may have called it with read-only ones, too."""
-    arrays = [kind for kind in result.signature.args if isinstance(kind, types.Array)]
-    return all(kind.layout == "C" and kind.mutable for kind in arrays)
-
-
 @cache
 class Door(types.WrapperAddressProtocol):
     """`advance`, compiled where it has not been, for a call by its address."""
@@ -77,7 +71,9 @@ class Door(types.WrapperAddressProtocol):
     def __init__(self) -> None:
         compile_kernels()
         dispatcher: Any = advance
-        self._result = next(filter(_takes_own_arrays, dispatcher.overloads.values()))
+        self._result = next(  # somebody may have called it with read-only arrays, too
+            result for result in dispatcher.overloads.values() if all(
+                kind.layout == "C" and kind.mutable for kind in result.signature.args if isinstance(kind, types.Array)))
 
     def __wrapper_address__(self) -> int:
         """Its address."""
@@ -111,19 +107,8 @@ def load_row(rows: Rows, i: int, room: Room, memory: Memory) -> None:
 
 
 @kernel
-def count_events(touches: Array, out: Output) -> int:
-    """Count the touches (2,) among the events, and forget these; returns their number."""
-    count = out.filled[Filled.EVENTS]
-    for k in range(count):
-        if out.events[k, Entry.KIND] == Transition.TOUCH.value:
-            touches[int(out.events[k, Entry.BODY])] += 1.0
-    out.filled[Filled.EVENTS] = 0
-    return int(count)
-
-
-@kernel
 def run_row(door: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, limits: Limits) -> int:
-    """Integrate a row over the interval of the loop; why it ended."""
+    """Integrate a row over the interval of the loop, and count its touches; why it ended."""
     place = Loop(*driven).place
     place[Place.INTERVAL] = place[Place.BEGUN] = 0
     outcome, events, out = np.int64(Outcome.EVENTS_FULL.value), 0, room.out
@@ -131,56 +116,55 @@ def run_row(door: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, 
         outcome = door(
             room.block, room.order, room.plant_block, room.state_block, room.state.mode, limits.tolerance,
             limits.max_work, out.grid, out.rows, out.events, out.filled, out.work, out.observer, driven)
-        events += count_events(rows.touches[i], out)
+        for k in range(out.filled[Filled.EVENTS]):
+            if out.events[k, Entry.KIND] == Transition.TOUCH.value:
+                rows.touches[i, int(out.events[k, Entry.BODY])] += 1.0
+        events += out.filled[Filled.EVENTS]
+        out.filled[Filled.EVENTS] = 0
     return int(outcome if events <= limits.max_events else Outcome.EVENTS_FULL.value)
 
 
 @kernel
 def go_on(door: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, memory: Memory, limits: Limits) -> int:
     """Go on with a row as `observer.settle` does, until V_c decides; why it ended."""
-    seen, switches, outcome, done = memory.seen, memory.switches, Outcome.DONE.value, 1
-    loop = Loop(*driven)
-    wanted, losses = switches[Switch.WANTED], switches[Switch.LOSSES]
-    switches[Switch.WANTED], switches[Switch.LOSSES] = Wanted.SETTLING.value, 0
+    seen, outcome, done, loop = memory.seen, Outcome.DONE.value, 1, Loop(*driven)
+    wanted, memory.switches[Switch.WANTED] = memory.switches[Switch.WANTED], Wanted.SETTLING.value
     left, right = rows.touches[i, 0], rows.touches[i, 1]
     while seen[Seen.SETTLED] == UNDECIDED and done < limits.horizons and outcome == Outcome.DONE:
         loop.begins[0] = done * loop.lengths[0]
         outcome = run_row(door, driven, rows, i, room, limits)
-        call(room.out.observer[ADDRESS], room.out.observer[CONTEXT], FINISH, 0.0, 0.0, 0.0, 0)
+        tell(room.out.observer, FINISH, 0.0)
         done += 1
     loop.begins[0] = 0.0
     rows.touches[i, 0], rows.touches[i, 1] = left, right
     if seen[Seen.SETTLED] == UNDECIDED:
         seen[Seen.SETTLED] = math.inf
-    switches[Switch.WANTED], switches[Switch.LOSSES] = wanted, losses
+    memory.switches[Switch.WANTED] = wanted
     return int(outcome)
 
 
 @machine_door
-def run_rows(door: Any, driven: tuple[Any, ...], rows: Rows, room: Room, memory: Memory, limits: Limits) -> int:
-    """Integrate the rows; returns how many, fewer only if a stop was asked for."""
-    n = rows.state.shape[0]
-    for i in range(n):
+def run_rows(door: Any, driven: tuple[Any, ...], rows: Rows, room: Room, memory: Memory, limits: Limits) -> None:
+    """Integrate the rows, or fewer if a stop is asked for."""
+    for i in range(rows.state.shape[0]):
         if limits.stop[0] != 0:
-            return i
+            break
         load_row(rows, i, room, memory)
-        if room.out.observer[ADDRESS] != 0:
-            call(room.out.observer[ADDRESS], room.out.observer[CONTEXT], BEGIN, limits.settled, 0.0, 0.0, 0)
+        tell(room.out.observer, BEGIN, limits.settled)
         outcome = run_row(door, driven, rows, i, room, limits)
         for place in range(6):
             rows.state[i, place] = room.state.y[place]
         if room.out.observer[ADDRESS] != 0:
-            call(room.out.observer[ADDRESS], room.out.observer[CONTEXT], FINISH, 0.0, 0.0, 0.0, 0)
+            tell(room.out.observer, FINISH, 0.0)
             if outcome == Outcome.DONE and memory.switches[Switch.WANTED] & Wanted.SETTLING.value:
                 outcome = go_on(door, driven, rows, i, room, memory, limits)
             for place in range(memory.seen.shape[0]):
                 rows.seen[i, place] = memory.seen[place]
         rows.outcome[i] = outcome
-    return n
 
 
-def integrate_rows(rows: Rows, duration: float, wanted: Wanted, limits: Limits) -> int:
-    """Integrate rows of one length under continuous feedback; returns how many.
+def integrate_rows(rows: Rows, duration: float, wanted: Wanted, limits: Limits) -> None:
+    """Integrate rows of one length under continuous feedback.
 
     Parameters
     ----------
@@ -202,5 +186,4 @@ def integrate_rows(rows: Rows, duration: float, wanted: Wanted, limits: Limits) 
         room = Room(block, order, *run, Output(
             np.zeros(0), np.zeros((0, 6)), events, np.zeros(len(Filled), dtype=np.int64),
             np.zeros(len(Work), dtype=np.int64), observer))
-        done = run_rows(Door(), driven, rows, room, run_observer.memory, limits)
-    return int(done)
+        run_rows(Door(), driven, rows, room, run_observer.memory, limits)

@@ -18,7 +18,7 @@ from grasp_ros.exact.kinematics import bound_by, next_derivative, own_accelerati
 from grasp_ros.exact.numerics.polynomial import lane_range, product
 from grasp_ros.exact.numerics.roots import first_rise, shift, value_and_rate
 from grasp_ros.exact.records import Array, Flight, Integers, Regime
-from grasp_ros.observe.record import LOWER, POSITION, QUANTITIES, UPPER, VELOCITY, Quantity, SegmentRecord
+from grasp_ros.observe.record import LOWER, POSITION, QUANTITIES, UPPER, VELOCITY, Quantity, Seen, SegmentRecord, Wanted
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Law, Of, Pair, U, V, X, Z
 
 MOST = 64  # turns of a polynomial in one step
@@ -92,16 +92,6 @@ def lane_bounds(segment: SegmentRecord, lane: int, at: float) -> tuple[float, fl
 
 
 @inlined
-def penetration_bounds(segment: SegmentRecord, side: Body) -> tuple[float, float]:
-    """Bounds of u."""
-    u = segment.m.y[U.L + side]
-    if segment.m.mode[side] != Pair.CONTACT:
-        return lane_bounds(segment, Z.L + side, u)
-    low, high = lane_bounds(segment, Z.L + side, math.sqrt(max(u, 0.0)))
-    return max(low, 0.0) * max(low, 0.0), high * high
-
-
-@inlined
 def flight_ranges(segment: SegmentRecord, low: Array, high: Array) -> None:
     """Bounds on positions and velocities in a flight, by the energy of the swing."""
     for body in (LEFT, OBJECT, RIGHT):
@@ -125,8 +115,11 @@ def step_ranges(segment: SegmentRecord, low: Array, high: Array) -> None:
     for lane in (V.L, V.O, V.R):
         low[lane], high[lane] = lane_bounds(segment, lane, segment.m.y[lane])
     for side in (LEFT, RIGHT):
-        low[U.L + side], high[U.L + side] = penetration_bounds(segment, side)
-        if segment.m.mode[side] == Pair.CONTACT:
+        u, touches = segment.m.y[U.L + side], segment.m.mode[side] == Pair.CONTACT
+        least, most = lane_bounds(segment, Z.L + side, math.sqrt(max(u, 0.0)) if touches else u)
+        low[U.L + side], high[U.L + side] = least, most
+        if touches:  # w = sqrt(u)
+            low[U.L + side], high[U.L + side] = max(least, 0.0) * max(least, 0.0), most * most
             (front, back), q = rate_lanes(side), Quantity.IMPACT_L + side
             factor = damping_factor(segment.m.pairs[side, Law.DISSIPATION], high[front] - low[back])
             force = elastic_force(segment.m.pairs[side, Law.HERTZIAN], high[U.L + side])
@@ -226,3 +219,44 @@ def extremes_of(segment: SegmentRecord, q: int) -> tuple[float, float]:
         return in_flight(segment, q)
     expand_quantity(segment, q)
     return polynomial_extremes(segment.m.rows, segment.degree, segment.s, segment.m.counts)
+
+
+@inlined
+def is_wanted(segment: SegmentRecord, q: int, wanted: int) -> bool:
+    """Whether the extremes of a quantity are kept; those of an impact only while there is one."""
+    if q < U.L:
+        return wanted & Wanted.MOTION.value != 0
+    if q >= Quantity.INPUT_L:
+        return wanted & Wanted.INPUTS.value != 0
+    return wanted & Wanted.IMPACTS.value != 0 and segment.m.mode[q % 2] == Pair.CONTACT
+
+
+@inlined
+def keep(seen: Array, q: int, low: float, high: float) -> None:
+    """Keep the least and the largest value of a quantity."""
+    seen[Seen.LOW + q] = min(seen[Seen.LOW + q], low)
+    seen[Seen.HIGH + q] = max(seen[Seen.HIGH + q], high)
+
+
+@inlined
+def watch_extremes(segment: SegmentRecord, seen: Array, wanted: int) -> None:
+    """Keep the extremes of what is wanted, where its range may hold new ones; the ranges stand in scratch."""
+    for q in range(QUANTITIES):
+        if is_wanted(segment, q, wanted) and may_exceed(segment, q, seen[Seen.LOW + q], seen[Seen.HIGH + q]):
+            keep(seen, q, *extremes_of(segment, q))
+
+
+@kernel
+def watch_rest(segment: SegmentRecord, seen: Array, wanted: int) -> None:
+    """Keep the extremes where nothing moves: a run may begin so, and under other inputs than before."""
+    y, pairs = segment.m.y, segment.m.pairs
+    for q in range(QUANTITIES):
+        if is_wanted(segment, q, wanted):
+            if q < Quantity.IMPACT_L:
+                value = y[q]
+            elif q < Quantity.INPUT_L:
+                value = elastic_force(pairs[q % 2, Law.HERTZIAN], y[U.L + q % 2])
+            else:
+                (a, b, c), lane = weights(segment, q), velocity_lane(owner(q))
+                value = a * y[lane - 1] + b * y[lane] + c
+            keep(seen, q, value, value)

@@ -29,9 +29,9 @@ SWUNG = 6.0  # rad, up to which the quadrature follows v^2 to rounding
 
 
 @inlined
-def add_damping(segment: SegmentRecord, seen: Array, body: Body, squares: float) -> None:
+def add_damping(segment: SegmentRecord, body: Body, squares: float) -> None:
     """What damper and feedback of a body take, from the integral of v^2; drag of the object is friction."""
-    taken = segment.m.own[body, Of.DAMPING] * squares
+    seen, taken = segment.m.seen, segment.m.own[body, Of.DAMPING] * squares
     if body == OBJECT:
         seen[Seen.FRICTION] += taken
     else:
@@ -83,15 +83,6 @@ def clamped_loss(segment: SegmentRecord, side: Body) -> float:
 
 
 @inlined
-def pace(segment: SegmentRecord, s: float) -> float:
-    """dt/ds of the variable of the polynomials, s."""
-    total = 0.0
-    for k in range(segment.degree, 0, -1):
-        total = total * s + k * segment.m.c[LANES * k + Lane.TIME]
-    return total
-
-
-@inlined
 def impact_power(segment: SegmentRecord, at: Array, side: Body) -> float:
     """p H u^(3/2) u'^2 of a pair in contact, W."""
     if segment.m.mode[side] != Pair.CONTACT:
@@ -101,37 +92,41 @@ def impact_power(segment: SegmentRecord, at: Array, side: Body) -> float:
 
 
 @kernel
-def step_losses(segment: SegmentRecord, seen: Array) -> None:
+def step_losses(segment: SegmentRecord) -> None:
     """Add what a step with polynomials in regularised time takes."""
     at = segment.m.rows[WORK]
     left = right = middle = impacts = 0.0
     for j in range(NODES.shape[0]):
         s = segment.s * NODES[j]
         values(segment.m.c, segment.degree, s, at)
-        share = segment.s * WEIGHTS[j] * pace(segment, s)
+        pace = 0.0  # dt/ds
+        for k in range(segment.degree, 0, -1):
+            pace = pace * s + k * segment.m.c[LANES * k + Lane.TIME]
+        share = segment.s * WEIGHTS[j] * pace
         left += share * at[velocity_lane(LEFT)] ** 2
         right += share * at[velocity_lane(RIGHT)] ** 2
         middle += share * at[V.O] ** 2
         impacts += share * (impact_power(segment, at, LEFT) + impact_power(segment, at, RIGHT))
-    add_damping(segment, seen, LEFT, left)
-    add_damping(segment, seen, RIGHT, right)
-    add_damping(segment, seen, OBJECT, middle)
-    seen[Seen.IMPACTS] += impacts + clamped_loss(segment, LEFT) + clamped_loss(segment, RIGHT)
+    add_damping(segment, LEFT, left)
+    add_damping(segment, RIGHT, right)
+    add_damping(segment, OBJECT, middle)
+    segment.m.seen[Seen.IMPACTS] += impacts + clamped_loss(segment, LEFT) + clamped_loss(segment, RIGHT)
 
 
 @kernel
-def add_losses(segment: SegmentRecord, base: Array, seen: Array) -> None:
+def add_losses(segment: SegmentRecord) -> None:
     """Add what a segment takes, and the work of the forces that are not in `base`: held commands, external forces."""
+    seen = segment.m.seen
     if segment.kind == Kind.FLIGHT:
         for body in (LEFT, OBJECT, RIGHT):
             if segment.m.own[body, Of.DAMPING] != 0.0 or segment.m.bodies[body, Of.DAMPING] != 0.0:
-                add_damping(segment, seen, body, flight_squares(segment, body))
+                add_damping(segment, body, flight_squares(segment, body))
         seen[Seen.IMPACTS] += clamped_loss(segment, LEFT) + clamped_loss(segment, RIGHT)
     else:
-        step_losses(segment, seen)
+        step_losses(segment)
     for body in (LEFT, OBJECT, RIGHT):
         place = velocity_lane(body) - 1
-        push = segment.m.given[body, Of.FORCE] - base[body, Of.FORCE]
+        push = segment.m.given[body, Of.FORCE] - segment.m.base[body, Of.FORCE]
         seen[Seen.WORK] += push * (segment.m.y[place] - segment.m.before[place])
     if segment.m.bodies[OBJECT, Of.MASS] < math.inf:
         against = segment.m.given[OBJECT, Of.FORCE] - segment.m.bodies[OBJECT, Of.FORCE]

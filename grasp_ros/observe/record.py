@@ -70,8 +70,7 @@ class Switch(IntEnum):
     """Indices of the integer settings of an observer."""
 
     WANTED = 0
-    LOSSES = 1  # address of `observer.observe_losses`, 0: they are not wanted
-    CERTAIN = 2  # 1: V_c cannot rise
+    CERTAIN = 1  # 1: V_c cannot rise
 
 
 class Memory(NamedTuple):
@@ -94,7 +93,7 @@ class Memory(NamedTuple):
     before: Array  # (8,) y at the begin of the segment
     rows: Array  # (SCRATCH_ROWS, LONGEST) scratch
     counts: Integers  # (COUNTS,) scratch
-    switches: Integers  # (3,)
+    switches: Integers  # see `Switch`
 
 
 def memory_of(plant: Plant, state: State) -> Memory:

@@ -24,7 +24,8 @@ reach = kernel(lyapunov.reach)
 def settled_from(m: Memory, V_c: float) -> float:
     """The time in s from which on no body leaves the bound for good; inf: it never comes; see `Seen.SETTLED`.
 
-    V_c never rises: once its level holds every body inside, nothing that follows leaves the bound.
+    V_c never rises: once its level holds every body inside, nothing that follows leaves the bound. What loses no energy
+    comes back to near its start (Poincare) and never settles.
     """
     left, middle, right, _, _ = reach(m.loop, m.pairs, V_c)
     most, bound = max(left, middle, right), m.seen[Seen.BOUND]
@@ -32,24 +33,9 @@ def settled_from(m: Memory, V_c: float) -> float:
         return math.nan
     if most <= bound or m.rest[SINCE] < math.inf:
         return max(m.seen[Seen.OUTSIDE + LEFT], m.seen[Seen.OUTSIDE + OBJECT], m.seen[Seen.OUTSIDE + RIGHT])
-    return UNDECIDED if takes_energy(m) else math.inf
-
-
-@kernel
-def takes_energy(m: Memory) -> bool:
-    """Whether anything takes energy; what loses none comes back to near its start (Poincare) and never settles."""
     loss = m.loop[LEFT, Of.DAMPING] + m.loop[OBJECT, Of.DAMPING] + m.loop[RIGHT, Of.DAMPING]
     loss += m.pairs[LEFT, Law.DISSIPATION] + m.pairs[RIGHT, Law.DISSIPATION]
-    return loss > 0.0 or m.mode[OBJECT] != Slide.FREE
-
-
-@inlined
-def leaves(segment: SegmentRecord, x: int, bound: float) -> bool:
-    """Whether a position leaves the bound within a segment."""
-    if not may_exceed(segment, x, -bound, bound):
-        return False
-    low, high = extremes_of(segment, x)
-    return bool(low < -bound or high > bound)
+    return UNDECIDED if loss > 0.0 or m.mode[OBJECT] != Slide.FREE else math.inf
 
 
 @inlined
@@ -60,21 +46,17 @@ def watch_bound(segment: SegmentRecord, seen: Array, now: float) -> None:
         x = int(velocity_lane(body) - 1)
         if abs(segment.m.y[x]) > bound:
             seen[Seen.OUTSIDE + body] = math.inf
-        elif abs(segment.m.before[x]) > bound or leaves(segment, x, bound):
-            seen[Seen.OUTSIDE + body] = (now - segment.t) + last_outside(segment, body, bound)
-
-
-@kernel
-def last_outside(segment: SegmentRecord, body: Body, bound: float) -> float:
-    """Time since the begin of a segment, which ends inside, at which a body comes inside, s."""
-    if segment.kind == Kind.FLIGHT:
-        return last_in_flight(segment, body, bound)
-    return last_in_step(segment, int(velocity_lane(body) - 1), bound)
+            continue
+        low, high = extremes_of(segment, x) if may_exceed(segment, x, -bound, bound) else (0.0, 0.0)
+        if max(abs(segment.m.before[x]), -low, high) > bound:
+            last = (last_in_flight(segment, body, bound) if segment.kind == Kind.FLIGHT
+                    else last_in_step(segment, x, bound))
+            seen[Seen.OUTSIDE + body] = (now - segment.t) + last
 
 
 @kernel
 def last_in_flight(segment: SegmentRecord, body: Body, bound: float) -> float:
-    """The same for one body in flight; 0 if it never is outside."""
+    """Time since the begin of a flight, which ends inside, at which a body comes inside, s; 0: it never is outside."""
     row, lane = segment.m.bodies[body], velocity_lane(body)
     x, v = segment.m.before[lane - 1], segment.m.before[lane]
     flight = launch(row, x, v)
