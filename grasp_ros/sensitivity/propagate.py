@@ -15,18 +15,72 @@ import math
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import door, kernel
 from grasp_ros.exact.driver.callback import FINISH, REST
+from grasp_ros.exact.driver.intervals import feedback
 from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, surface_factor
 from grasp_ros.exact.numerics.polynomial import invert_time
 from grasp_ros.exact.numerics.roots import shift, value_and_rate
 from grasp_ros.exact.records import Order, Step
 from grasp_ros.exact.tolerances import SURFACE
+from grasp_ros.physics.control import Column
 from grasp_ros.physics.impact_law import EXPONENT
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, Slide, U, V, X
 from grasp_ros.sensitivity.contact import exact_length, expand_tangents, step_tangents, touches
 from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent, write_flows
-from grasp_ros.sensitivity.held import act, enter_tick
 from grasp_ros.sensitivity.tangents import UNSEEN, Count, Number, Tangents, copy_matrix, tangents_at
+
+
+@kernel
+def act(t: Tangents) -> None:
+    """Write how the directions change what acts on the bodies in a segment."""
+    for body in (LEFT, RIGHT, OBJECT):
+        copy_matrix(t.acting[body], t.given[body])
+        for j in range(t.force.shape[1]):
+            t.acting[body, Of.FORCE, j] += t.force[body, j]
+    slide = t.mode[OBJECT]
+    if slide in (Slide.RIGHTWARD, Slide.LEFTWARD):
+        against = -1.0 if slide == Slide.RIGHTWARD else 1.0
+        for j in range(t.force.shape[1]):
+            t.acting[OBJECT, Of.FORCE, j] += against * t.coulomb[j]
+
+
+@kernel
+def answer(t: Tangents, side: Body, tick: int, j: int) -> tuple[float, bool]:
+    """Derivative of what a sampled controller answers to the state of a tick, N by the unit of a direction.
+
+    Beyond its limit an actuator hands on nothing of the state. Just at it one-sided derivatives differ: the second
+    answer.
+    """
+    row, rates, lane = t.control[side], t.control_rates[side], velocity_lane(side)
+    first, second = t.normals[min(tick, t.normals.shape[0] - 1), side]
+    x = t.before[lane - 1] + row[Column.POSITION_NOISE] * first
+    v = t.before[lane] + row[Column.VELOCITY_NOISE] * second
+    force = feedback(row, x, v)
+    limited = math.copysign(1.0, force) * rates[Column.LIMIT, j] if force != 0.0 else 0.0
+    if abs(force) > row[Column.LIMIT] or row[Column.LIMIT] == 0.0:
+        return limited, False
+    away = t.x[lane - 1, j] + rates[Column.POSITION_NOISE, j] * first - rates[Column.SET_POINT, j]
+    faster = t.x[lane, j] + rates[Column.VELOCITY_NOISE, j] * second
+    free = (rates[Column.FEED_FORWARD, j] - row[Column.POSITION_GAIN] * away - row[Column.VELOCITY_GAIN] * faster
+            - rates[Column.POSITION_GAIN, j] * (x - row[Column.SET_POINT]) - rates[Column.VELOCITY_GAIN, j] * v)
+    return free, abs(force) == row[Column.LIMIT] and free != limited
+
+
+@kernel
+def enter_tick(t: Tangents, tick: int) -> bool:
+    """Let the inputs of a control period act, answers that arrive and external forces; whether one is at its limit."""
+    corner, delay = False, t.waiting.shape[0]
+    slot = tick % delay if delay > 0 else 0
+    for body in (LEFT, RIGHT, OBJECT):
+        for j in range(t.force.shape[1]):
+            force, edge = answer(t, body, tick, j) if body != OBJECT else (0.0, False)
+            corner = corner or edge
+            if delay > 0 and body != OBJECT:
+                force, t.waiting[slot, body, j] = t.waiting[slot, body, j], force
+            if tick < t.external.shape[0]:
+                force += t.external[tick, body, j]
+            t.force[body, j] = force
+    return corner
 
 
 @kernel
@@ -39,36 +93,27 @@ def impact_now(t: Tangents, side: Body) -> float:
 
 
 @kernel
-def friction_factor(t: Tangents, at_tick: bool) -> float:
-    """What the tangent of the object's velocity is multiplied by where the mode of its dry friction has changed.
+def pass_friction(t: Tangents, at_tick: bool) -> None:
+    """The jump of the tangents where the mode of an object under dry friction has changed: v_o times a factor.
 
     Where the object turns, that is its acceleration after the turn by that before it. It is nan where the one-sided
     derivatives differ. Of an object that stops just when inputs change nobody knows which of them would act on it.
     """
-    before = t.counts[Count.SLIDE]
+    before, now, factor = t.counts[Count.SLIDE], t.mode[OBJECT], 1.0
+    if now == Slide.FREE or now == before:
+        return
     slid = before == Slide.RIGHTWARD or before == Slide.LEFTWARD
     if slid and at_tick:
-        return math.nan
-    if t.mode[OBJECT] == Slide.STUCK:
-        return 0.0
-    if slid:
+        factor = math.nan
+    elif now == Slide.STUCK:
+        factor = 0.0
+    elif slid:
         push, new = impact_now(t, LEFT) - impact_now(t, RIGHT), t.bodies[OBJECT]
         push -= new[Of.STIFFNESS] * t.before[X.O] + new[Of.DAMPING] * t.before[V.O]
         first = push + t.numbers[Number.FORCE]  # under the constant force before
-        return (push + new[Of.FORCE]) / first if first != 0.0 else math.nan
-    if before == UNSEEN and t.before[V.O] == 0.0:
-        for j in range(t.x.shape[1]):
-            if t.x[V.O, j] != 0.0:
-                return math.nan
-    return 1.0
-
-
-@kernel
-def pass_friction(t: Tangents, at_tick: bool) -> None:
-    """The jump of the tangents where the mode of an object under dry friction has changed."""
-    if t.mode[OBJECT] == Slide.FREE or t.mode[OBJECT] == t.counts[Count.SLIDE]:
-        return
-    factor = friction_factor(t, at_tick)
+        factor = (push + new[Of.FORCE]) / first if first != 0.0 else math.nan
+    elif before == UNSEEN and t.before[V.O] == 0.0 and t.x[V.O].any():
+        factor = math.nan
     if math.isnan(factor):
         t.numbers[Number.CORNER] = min(t.numbers[Number.CORNER], t.numbers[Number.TIME])
         return
@@ -121,17 +166,6 @@ def next_output(t: Tangents) -> float:
 def since(t: Tangents, begin: float, span: float) -> float:
     """Time from a begin to the next output, within a span."""
     return min(max(next_output(t) - begin, 0.0), span)
-
-
-@kernel
-def enter_ticks(t: Tangents, interval: float) -> None:
-    """Take the ticks up to the begin of an interval, in s."""
-    counts, period = t.counts, t.numbers[Number.PERIOD]
-    last = math.floor(interval / period + 0.5) if counts[Count.DRIVEN] else counts[Count.TICK]
-    while counts[Count.TICK] < last:
-        counts[Count.TICK] += 1
-        if enter_tick(t, counts[Count.TICK]):
-            t.numbers[Number.CORNER] = min(t.numbers[Number.CORNER], counts[Count.TICK] * period)
 
 
 @kernel
@@ -236,7 +270,12 @@ def propagate(address: int, kind: int, span: float, s: float, unit: float, degre
     now, interval = t.clock[0] + t.clock[1], t.clock[2]
     since_tick = now if kind == REST else now - span
     pass_friction(t, t.counts[Count.DRIVEN] != 0 and since_tick <= 0.0)
-    enter_ticks(t, interval)
+    counts, period = t.counts, t.numbers[Number.PERIOD]
+    last = math.floor(interval / period + 0.5) if counts[Count.DRIVEN] else counts[Count.TICK]
+    while counts[Count.TICK] < last:  # the ticks up to the begin of the interval
+        counts[Count.TICK] += 1
+        if enter_tick(t, counts[Count.TICK]):
+            t.numbers[Number.CORNER] = min(t.numbers[Number.CORNER], counts[Count.TICK] * period)
     t.numbers[Number.TIME] = now + interval + (span if kind == REST else 0.0)
     pass_segment(t, kind, since_tick + interval, span, s, unit, degree)
     t.counts[Count.SLIDE], t.numbers[Number.FORCE] = t.mode[OBJECT], t.bodies[OBJECT, Of.FORCE]

@@ -44,9 +44,8 @@ class Carrier(Observer):
 
     def __init__(self, scene: Scene, integrator: Integrator, directions: Directions, times: Array, sampled: bool,
                  e: int = 0) -> None:
-        system, n, changes = scene.system, directions.state.shape[1], directions
-        if not sampled:
-            changes = directions.closed_loop(system)
+        system, n = scene.system, directions.state.shape[1]
+        changes = directions if sampled else directions.closed_loop(system)
         tangents = tangents_of(integrator.plant, integrator.records, changes, times, e)
         if sampled or system.external:
             tangents.counts[Count.DRIVEN], tangents.numbers[Number.PERIOD] = 1, scene.time_of(1)
