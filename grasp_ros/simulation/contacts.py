@@ -17,7 +17,7 @@ from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.simulation.repeat import breaks_of, reached
-from grasp_ros.simulation.smooth import Quantity, expand
+from grasp_ros.simulation.smooth import MOST_HALVINGS, Quantity, expand
 
 if TYPE_CHECKING:  # it imports this file
     from grasp_ros.simulation.trajectory import Trajectory
@@ -75,7 +75,8 @@ def contact_table(run: Trajectory, side: Body) -> np.ndarray:
     begins, ends = breaks[:-1], breaks[1:]
     group = np.searchsorted(found[:, 0], begins, side="right") - 1
     within = (group >= 0) & (ends <= found[group, 1])
-    pieces = expand(run.at, _quantities_of(run.scene.system, side), begins[within], ends[within], group[within])
+    pieces = expand(run.at, _quantities_of(run.scene.system, side), begins[within], ends[within], group[within],
+                    MOST_HALVINGS)  # an impact of microseconds may begin a contact of minutes
     for name, column in (("impulse", 0), ("loss", 1)):
         rows[name] = pieces.integral(column, len(found))
     for name, column in (("peak_force", 0), ("deepest", 2)):

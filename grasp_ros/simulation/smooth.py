@@ -23,7 +23,8 @@ NODES = 24
 RESOLVED = 1e-13  # last coefficients of a piece, of the largest value of its group: what follows them may be larger
 LAST = 3  # coefficients that must be small
 ROUNDINGS, TINY = 4.0 * EPS, np.finfo(float).tiny  # of a time; what no two times are nearer than
-HALVINGS = 12  # of a piece; what is not resolved then is no smooth function, or rounding
+HALVINGS = 12  # of a piece; what is not resolved then is no smooth function, or rounding,
+MOST_HALVINGS, MOST = 40, 4096  # or of what is known to be smooth; then so many pieces at a time are rounding
 States = Callable[[Array], Array]
 Quantity = Callable[[Array, Array], tuple[Array, Array]]  # t (n,), state (n, 6) to values and their rounding (n, m)
 
@@ -77,7 +78,8 @@ def real_roots(series: Array) -> Array:
     return np.sort(np.clip(near, -1.0, 1.0))
 
 
-def expand(states: States, quantity: Quantity, begins: Array, ends: Array, group: NDArray[np.int64]) -> Pieces:
+def expand(states: States, quantity: Quantity, begins: Array, ends: Array, group: NDArray[np.int64],
+           halvings: int = HALVINGS) -> Pieces:
     """Pieces of a motion, halved until they are resolved relative to the largest value of their group.
 
     They begin and end (k,) in s, without an event or a change of an input within, and belong to a group (k,), 0, 1, ...
@@ -85,7 +87,7 @@ def expand(states: States, quantity: Quantity, begins: Array, ends: Array, group
     done: list[Pieces] = []
     begin, length = begins, ends - begins
     scale = np.zeros((int(group.max(initial=-1)) + 1, 1))
-    for halving in range(HALVINGS + 1):
+    for halving in range(halvings + 1):
         if not len(begin):
             break
         t = begin[:, None] + length[:, None] * PART
@@ -98,7 +100,8 @@ def expand(states: States, quantity: Quantity, begins: Array, ends: Array, group
         steepest = np.abs(np.diff(found, axis=1) / np.maximum(np.diff(t), TINY)[..., None]).max(axis=1)
         rounding = noise.max(axis=1) + ROUNDINGS * t[:, -1:] * steepest  # of values, and of times late in a run
         good = (tail <= RESOLVED * scale[group] + rounding).all(axis=1)
-        kept = good if halving < HALVINGS else np.ones(len(begin), dtype=bool)
+        last = halving == halvings or (halving >= HALVINGS and len(begin) > MOST)
+        kept = np.ones(len(begin), dtype=bool) if last else good
         done.append(Pieces(begin[kept], length[kept], group[kept], found[kept], series[kept], good[kept]))
         half, left = 0.5 * length[~kept], begin[~kept]
         begin, length = np.stack([left, left + half], axis=1).ravel(), np.repeat(half, 2)

@@ -145,11 +145,16 @@ def test_no_number_that_was_set_is_missed_by_a_monitor_that_is_behind(context: r
     loop, behind = (SingleThreadedExecutor(context=context) for _ in range(2))
     for executor, node in ((loop, plant), (loop, controller), (behind, monitor)):
         executor.add_node(node)
-    wait_for(lambda: [executor.spin_once(timeout_sec=0.01) for executor in (loop, behind)] and plant.tick > 2, "ticks")
+
+    def spin() -> None:  # many at a time, because `wait_for` sleeps after each look: thousands of messages wait
+        for executor in 50 * [loop, behind]:
+            executor.spin_once(timeout_sec=0.001)
+
+    wait_for(lambda: spin() or plant.tick > 2, "ticks")
     while plant.tick < 490:
         assert controller.set_parameters([Parameter(GAIN, value=1.0 + plant.tick)])[0].successful
         loop.spin_once(timeout_sec=0.1)
-    wait_for(lambda: [executor.spin_once(timeout_sec=0.001) for executor in (loop, behind)] and monitor.finished, "end")
+    wait_for(lambda: spin() or monitor.finished, "end")
     end_nodes(plant, controller, monitor)
     recording = bag.read(tmp_path / "bag")
     assert len(recording.changes) > 400

@@ -21,6 +21,10 @@ RUNS: dict[str, tuple[str, list[str], dict[str, Any]]] = {
     "case 1": ("case_01", [], {}), "sampled": ("case_01", [], {"sampled": True}),
     "late": ("case_02", ["time.duration_s=600"], {}),
     "clamped": ("v_jump_one_sided", [], {}), "held for long": ("preload", [], {}),
+    "held for long after an impact of microseconds": ("case_01", [
+        f"{side}_{number}" for side, sign in (("left", ""), ("right", "-")) for number in (
+            "contact.hertz_N_per_m1_5=1e9", "contact.dissipation_s_per_m=30", "feedback.velocity_gain_Ns_per_m=5",
+            f"feedback.feed_forward_N={sign}5")] + ["time.duration_s=500"], {}),
     "from begin to end": ("hammer", ["left_arm.position_m=0.02", "time.duration_s=0.01"], {}),
     "from begin to end, clamped": (
         "hammer", ["left_arm.position_m=0.02", "left_contact.dissipation_s_per_m=100", "time.duration_s=0.2"], {}),
@@ -42,6 +46,15 @@ def test_impulses_are_the_change_of_momentum_and_losses_those_of_the_run(kind: s
     if not run.sampled and "method" not in how:  # otherwise `losses` are no more exact than the output times
         assert lost == pytest.approx(float(losses(run).impacts), rel=1e-10)
     assert left.dtype.names == tuple(UNITS)
+
+
+def test_the_peak_of_an_impact_that_is_over_long_before_its_contact_is_found() -> None:
+    """A clamp surface beside it: u' falls within 3 us, while the arm is pressed on for 30 ms."""
+    contact = {"hertz_N_per_m1_5": 6e9, "dissipation_s_per_m": 700.0}
+    run = simulate(case := made(0.035, left_arm=body(1.1, -0.02, 5.0, stiffness_N_per_m=7000.0), left_contact=contact,
+                                object=body(60.0, 0.0, -1.6)))
+    seen = ensemble(case, {"object.mass_kg": [60.0]}, ["peak_impact"]).columns["peak_impact_left"]
+    assert run.contacts("left")["peak_force"].max() == pytest.approx(seen[0], rel=1e-10)
 
 
 def test_a_piece_late_in_a_run_is_resolved_though_its_times_are_rounded() -> None:
