@@ -21,8 +21,9 @@ from grasp_ros.scene.places import check_scene
 from grasp_ros.sensitivity.directions import no_directions
 from grasp_ros.sensitivity.run import Carrier
 
-PIECE_S, MOST_PIECES = 0.5, 2**16  # of time: the longest, and how many
+PIECE_S, MOST_PIECES = 0.5, 2**17  # of time: the longest, and how many
 FALL = 1e-10  # of a tangent within a piece, to what is left of it at right angles to others: below, it has few digits
+AGREE = 1e-3  # of logarithms of growth, from pieces to half as long ones
 DECAY = 10.0  # time constants of the dampers in a piece, at most
 
 
@@ -30,7 +31,7 @@ def spectrum(scene: Scene, *, accuracy: float = ACCURACY) -> Array:
     """Lyapunov exponents (2 b,) of a run of b bodies under continuous feedback, descending, 1/s.
 
     Lengths are those of states (x, v) in m and m/s. An object that sticks loses a direction: its exponent is -inf, and
-    so is that of another one of which no digit is left when it sticks again.
+    so is that of another one of which no digit is left when it sticks again. NaN: of which no three digits are known.
 
     Raises
     ------
@@ -43,18 +44,21 @@ def spectrum(scene: Scene, *, accuracy: float = ACCURACY) -> Array:
     places = [place for body in scene.system.present for place in (COLUMN[body], COLUMN[body] + 1)]
     bodies = scene.system.closed_loop[scene.system.present]
     rate = max(1.0 / PIECE_S, float((bodies[:, Of.DAMPING] / bodies[:, Of.MASS]).max()) / DECAY)
-    pieces = max(math.ceil(scene.duration * rate), 1)
-    while pieces > MOST_PIECES or (grown := _growth(scene, places, accuracy, pieces)) is None:
-        if pieces > MOST_PIECES:
-            raise Refused(f"{scene.name}: Lyapunov exponents: tangents fall below {FALL:g} of their length within"
-                          f" {scene.duration / MOST_PIECES:.3g} s; allowed: slower ones, or a shorter time.duration_s")
-        pieces *= 2
-    lost = np.full(len(places) - len(grown), -np.inf)
-    return np.concatenate([np.sort(grown)[::-1] / scene.duration, lost])
+    pieces, before = max(math.ceil(scene.duration * rate), 1), None
+    while pieces <= MOST_PIECES:
+        grown = _growth(scene, places, accuracy, pieces)
+        if grown is not None and before is not None:  # within a piece tangents may grow, and fall again
+            known = min(len(grown), len(before))
+            close = np.isclose(grown[:known], before[:known], rtol=AGREE, atol=AGREE)
+            lost = np.full(len(places) - known, -np.inf)
+            return np.concatenate([np.where(close, grown[:known] / scene.duration, np.nan), lost])
+        pieces, before = 2 * pieces, grown
+    raise Refused(f"{scene.name}: Lyapunov exponents: tangents lose their digits within"
+                  f" {scene.duration / MOST_PIECES:.3g} s; allowed: slower ones, or a shorter time.duration_s")
 
 
 def _growth(scene: Scene, places: list[int], accuracy: float, pieces: int) -> Array | None:
-    """Logarithms of by how much the tangents grow that are not lost; None if one falls too far within a piece."""
+    """Logarithms of how much tangents that are not lost grow, descending; None if one falls too far within a piece."""
     n, piece_s = len(places), scene.duration / pieces
     start, grown = np.zeros((6, n)), np.zeros(n)
     start[places, range(n)] = 1.0
@@ -77,7 +81,7 @@ def _growth(scene: Scene, places: list[int], accuracy: float, pieces: int) -> Ar
         grown = grown[kept] + np.log(lengths)
         carrier.x[:] = 0.0
         carrier.x[np.ix_(places, range(len(kept)))] = square
-    return grown
+    return np.sort(grown)[::-1]
 
 
 def _at_right_angles(moved: Array, stuck: bool) -> tuple[np.ndarray, Array, Array] | None:
