@@ -25,7 +25,7 @@ from grasp_ros.physics.errors import Refused
 def main(name: str, child: bool = False) -> int:
     """Run the node of that name; returns the exit status of the process.
 
-    A child ends with the process that holds the other end of its standard input. "together" runs several in one thread:
+    A child ends with the process that holds the other end of its standard input. "graph" runs several in one thread:
     those that stand on the command line before `--ros-args`; their parameters as `-p node:name:=value`.
     """
     words = _own_words()
@@ -33,8 +33,8 @@ def main(name: str, child: bool = False) -> int:
         print(usage(name))
         return 0
     try:
-        check_reach(os.environ, alone=name == "together")
-        if words and name != "together":
+        check_reach(os.environ, alone=name == "graph")
+        if words and name != "graph":
             raise Refused(f"{' '.join(words)}: not allowed; allowed: --help, or --ros-args -p NAME:=VALUE ...")
     except Refused as error:
         print(f"{name}: {error}", file=sys.stderr)
@@ -54,7 +54,7 @@ def main(name: str, child: bool = False) -> int:
         # which no kernel uses. A plant runs no code but the package's own.
         for module in ("coverage", "scipy"):
             sys.modules.setdefault(module, None)  # type: ignore[arg-type]
-    names = sys.argv[1 : sys.argv.index("--ros-args")] if name == "together" else [name]
+    names = sys.argv[1 : sys.argv.index("--ros-args")] if name == "graph" else [name]
     makes = {each: partial(_maker(each), cli_args=_arguments_of(each)) for each in names}
     status: int = import_module("grasp_ros.graph.ros.executor").run(makes, received)
     return status
@@ -93,7 +93,7 @@ def start() -> int:
     if name in ("-h", "--help"):
         print(f"usage: python -m grasp_ros.graph NODE [--help] [--ros-args ...]; NODE is one of {', '.join(NODES)}")
         return 0
-    if name not in PARAMETERS and not (is_child and name == "together"):
+    if name not in PARAMETERS and not (is_child and name == "graph"):
         print(f"{name!r} is no node; allowed: {', '.join(NODES)}", file=sys.stderr)
         return 2
     try:

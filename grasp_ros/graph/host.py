@@ -30,7 +30,9 @@ RANGES = ("", LOCALHOST, SUBNET, "SYSTEM_DEFAULT")
 DOMAIN, MOST_DOMAIN = "ROS_DOMAIN_ID", 232  # the last one whose ports exist
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 PROFILE = CONFIG / "this_host.xml"
-OTHER_WISHES = ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "FASTDDS_DEFAULT_PROFILES_FILE", PROFILES)
+SERVER = "ROS_DISCOVERY_SERVER"
+PROFILE_FILES = ("FASTDDS_DEFAULT_PROFILES_FILE", PROFILES)
+OTHER_WISHES = ("ROS_STATIC_PEERS", SERVER, *PROFILE_FILES)
 MIDDLEWARE, OURS = "RMW_IMPLEMENTATION", "rmw_fastrtps_cpp"  # the one that the profile is for
 LEAST_BYTES = 2**31  # that a node can address: with its libraries and threads it takes up to 1.8e9
 LEAST_FILES = 32  # that a node has open: its libraries, and the sockets of DDS
@@ -60,7 +62,9 @@ def this_host(given: Mapping[str, str]) -> dict[str, str]:
 def place(given: Mapping[str, str], namespace: str) -> str:
     """Where a process with these variables looks for others, in words."""
     reach = "this host" if given.get(RANGE) == LOCALHOST else "the network"
-    return f"in ROS domain {given.get(DOMAIN) or 0}, namespace {namespace}, on {reach}"
+    server = given.get(SERVER)
+    through = f", through {SERVER} {server}" if server else ""
+    return f"in ROS domain {given.get(DOMAIN) or 0}, namespace {namespace}, on {reach}{through}"
 
 
 def hold(given: Mapping[str, str], namespace: str) -> socket.socket:
@@ -103,6 +107,19 @@ def check_reach(given: Mapping[str, str], alone: bool = False) -> None:
         raise Refused(f"{RANGE}: {reach!r} is not allowed{why}; allowed: {', '.join(RANGES[1:])}")
     if middleware and middleware not in (installed := _installed(given)):  # ROS's library would end the process
         raise Refused(f"{MIDDLEWARE}: {middleware!r} is not allowed; allowed here: {', '.join(installed)}")
+    for name in PROFILE_FILES:
+        if given.get(name):
+            _check_profile(name, given[name])
+
+
+def _check_profile(name: str, file: str) -> None:
+    """Refuse a file that Fast DDS would pass over without a word, and listen to every interface."""
+    from xml.etree import ElementTree  # most have no such file
+
+    try:
+        ElementTree.parse(file)
+    except (OSError, ElementTree.ParseError) as error:
+        raise Refused(f"{name}: {file!r} is not allowed: {error}; allowed: an XML file of profiles") from None
 
 
 def _installed(given: Mapping[str, str]) -> list[str]:

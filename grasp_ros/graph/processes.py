@@ -40,7 +40,7 @@ def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> No
 
 
 def _command(nodes: Sequence[str], parameters: Mapping[str, str], namespace: str) -> list[str]:
-    """Command line of a node, or of "together" and the nodes of its process; after "child" it ends with this one."""
+    """Command line of a node, or of "graph" and the nodes of its process; after "child" it ends with this one."""
     words = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
     root = namespace.rstrip("/")
     names = ["-r", f"__ns:={namespace}", "-r", f"/clock:={root}/clock"] if root else []
@@ -147,7 +147,7 @@ class Graph:
         if not self.one_process:
             return {name: _command(["child", name], numbers, self.namespace) for name, numbers in settings.items()}
         together = {f"{name}:{key}": value for name, numbers in settings.items() for key, value in numbers.items()}
-        return {"graph": _command(["child", "together", *settings], together, self.namespace)}
+        return {"graph": _command(["child", "graph", *settings], together, self.namespace)}
 
     def wait(self, received: Sequence[int]) -> None:
         """Wait until plant and monitor have finished, or until a signal has been received.
@@ -209,8 +209,8 @@ class Graph:
             if status < 0:
                 why = f"was killed by {signal.Signals(-status).name}{NO_MEMORY if status == -signal.SIGBUS else ''}"
                 self._causes.append((time.monotonic(), f"{name}: {why}", 1))
-        if ended and self._causes:
-            _, why, status = min(self._causes)
+        first, why, status = min(self._causes, default=(math.inf, "", 0))
+        if (ended and why) or time.monotonic() > first + STOP_SECONDS:  # its own end may hang
             raise (Refused if status == 2 else Failed)(why)
         for name, status in ended.items():
             if status or name.endswith("controller"):

@@ -60,11 +60,14 @@ def end_late_by_force(name: str, received: list[int]) -> None:
 def end_by_force(name: str, status: int = 1) -> None:
     """Give this process GRACE_SECONDS to end, and the status of the last call."""
     _status[:] = [status]
+    signal.alarm(int(GRACE_SECONDS) + 2)  # for an interpreter whose own end hangs: no thread runs there any more
 
     def end() -> None:
         time.sleep(GRACE_SECONDS)
+        others = [own.name for own in threading.enumerate() if not (own.daemon or own is threading.main_thread())]
+        why = f", kept by {', '.join(others)}" if others else ""  # threads of a law
         with suppress(OSError):  # nobody may read it
-            print(f"{name}: has not ended within {GRACE_SECONDS:g} s: ended by force", file=sys.stderr,
+            print(f"{name}: has not ended within {GRACE_SECONDS:g} s{why}: ended by force", file=sys.stderr,
                   flush=True)
         os._exit(*_status)
 

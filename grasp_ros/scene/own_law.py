@@ -38,7 +38,8 @@ def find_law(place: str, what: str) -> Law | type:
     try:
         law: Any = reduce(getattr, name.split("."), holder)
     except AttributeError:
-        raise Refused(f"{what}: {module} has no {name}; allowed: a callable of it") from None
+        where = getattr(holder, "__file__", "built into Python")
+        raise Refused(f"{what}: {module} has no {name} ({where}); allowed: a callable of it") from None
     if not callable(law):
         raise Refused(f"{what}: {law!r} cannot be called; allowed: {CALLABLE}")
     found: Law | type = law

@@ -90,7 +90,7 @@ FAULTS = [  # and the last sentence, in the words of the first that has noticed
     ("plant", signal.SIGTERM, r"plant: was ended by SIGTERM"),
     pytest.param("right_controller", signal.SIGINT, r"right_controller: was ended by SIGINT",
                  marks=pytest.mark.thorough),
-    ("together", signal.SIGSTOP, r"graph: was suspended for more than 1\.5 s"),
+    ("graph", signal.SIGSTOP, r"graph: was suspended for more than 1\.5 s"),
 ]
 
 
@@ -98,7 +98,7 @@ FAULTS = [  # and the last sentence, in the words of the first that has noticed
 def test_a_run_ends_with_a_sentence(
     grasp_run: Any, tmp_path: Path, name: str, number: signal.Signals, words: str
 ) -> None:
-    run = grasp_run("case_01", *(["--one-process"] if name == "together" else []))
+    run = grasp_run("case_01", *(["--one-process"] if name == "graph" else []))
     file = growing(tmp_path / "run" / "bag", 50_000)
     os.kill(children(tmp_path)[name], number)
     _, err = run.communicate(timeout=DEADLINE)
@@ -235,6 +235,16 @@ def test_a_law_that_goes_away_is_followed_and_one_that_stands_in_one_process_has
     assert bag.read(tmp_path / "run" / "bag").tick[-1] > 100
 
 
+@pytest.mark.parametrize("line", ["time.sleep(3600.0)", "input()"])
+def test_a_law_whose_import_does_not_return_is_named(launch: Any, tmp_path: Path, line: str) -> None:
+    (tmp_path / "mine.py").write_text(f"import time\n{line}\n")
+    words = node_command("left_controller", law="mine:law", start_timeout_s=1.0, peer_timeout_s=0.5, on_silence="end")
+    with launch(*words, cwd=tmp_path, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as node:
+        node.wait(DEADLINE)  # its standard input stays open
+        err = node.stderr.read()
+    assert re.search(r"^\[FATAL\] \[left_controller\]: blocked for \d\.\d s: in .*mine.py, line 2$", err, re.M), err
+
+
 STANDING = """
 import time
 from pathlib import Path
@@ -269,3 +279,14 @@ def test_one_that_has_just_come_is_not_silent_as_the_one_before_it(node: tuple[A
     assert heartbeats.quiet(["/plant"], time.monotonic()) == []  # whom DDS lists by now is another one
     heartbeats.end("")
     end_nodes(waiting)
+
+
+@pytest.mark.thorough
+def test_a_process_whose_own_end_hangs_is_ended(grasp_run: Any, tmp_path: Path) -> None:
+    """DDS waits for ever for what a law has closed."""
+    (tmp_path / "mine.py").write_text("import os\ndef law(tick, t, x, v):\n    os.closerange(3, 200)\n    return 0.0\n")
+    run = grasp_run("case_01", "--one-process", "--controller", "left=mine:law")
+    _, err = run.communicate(timeout=DEADLINE)
+    assert run.returncode == 1
+    assert "Bad file descriptor" in err
+    wait_for(lambda: not children(tmp_path), "the end of all processes")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -72,8 +73,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         ("laws_here.more:f", ": no module laws_here.more; allowed: one of the current directory"),
         ("broken_here:f", ": broken_here cannot be imported: invalid syntax"),
         ("needs_here:f", ": needs_here cannot be imported: No module named 'nowhere_at_all'"),
-        ("laws_here:other", ": laws_here has no other; allowed: a callable of it"),
-        ("laws_here:Box.other", ": laws_here has no Box.other; allowed: a callable of it"),
+        ("laws_here:other", ": laws_here has no other ("), ("laws_here:Box.other", ": laws_here has no Box.other ("),
+        ("json:law", f": json has no law ({json.__file__}); allowed: a callable of it"),
         ("laws_here:number", ": 3.0 cannot be called; allowed: a callable of tick, time, x and v"),
     ],
 )

@@ -199,6 +199,8 @@ REFUSED = [
     ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF", "no node would find another"),
     ("ROS_AUTOMATIC_DISCOVERY_RANGE", "local", "allowed: LOCALHOST, SUBNET, SYSTEM_DEFAULT"),
     ("RMW_IMPLEMENTATION", "rmw_other_cpp", "allowed here: rmw_fastrtps_cpp"),
+    ("FASTRTPS_DEFAULT_PROFILES_FILE", "nowhere.xml", "No such file or directory"),
+    ("FASTDDS_DEFAULT_PROFILES_FILE", __file__, "; allowed: an XML file of profiles"),
 ]
 
 

@@ -54,7 +54,7 @@ def test_nothing_outlives_a_run_that_is_killed(grasp_run: Any, tmp_path: Path, o
     growing(tmp_path / "run" / "bag", 300_000)
     started = children(tmp_path)
     assert len(started) == (1 if options else 4)
-    os.kill(started.get("right_controller", 0) or started["together"], signal.SIGSTOP)
+    os.kill(started.get("right_controller", 0) or started["graph"], signal.SIGSTOP)
     run.kill()
     run.wait(DEADLINE)
     wait_for(lambda: not children(tmp_path), "the end of all processes")

@@ -158,6 +158,8 @@ def test_wishes_of_the_user_come_first() -> None:
         assert host.this_host({name: "x"}) == {host.RANGE: host.LOCALHOST}
     assert host.network({}) == host.network({host.RANGE: host.LOCALHOST}) == {host.RANGE: host.SUBNET}
     assert host.network({host.RANGE: "SYSTEM_DEFAULT"}) == {}
+    assert host.place({host.RANGE: host.LOCALHOST, host.SERVER: "there:11811"}, "/").endswith(
+        "on this host, through ROS_DISCOVERY_SERVER there:11811")
 
 
 def plain_environment(domain: int, **more: str) -> dict[str, str]:

@@ -15,6 +15,7 @@ from rclpy.node import Node
 
 from grasp_ros.graph.health.heartbeat import HEARTBEAT_SECONDS
 from grasp_ros.graph.stopping import tell_parent
+from grasp_ros.physics.errors import OTHERS
 
 EVERY_SECONDS = 5.0  # from one sentence to the next
 PAUSE_SECONDS = 2.0 * HEARTBEAT_SECONDS  # between two beats, if the process was stopped itself
@@ -59,18 +60,28 @@ class Watchdog:
         if most is None or seconds <= self._patience:
             return
         frozen = " and ".join(self._frozen())
-        if not frozen and not (self._ends and seconds > most):
+        if not frozen and seconds <= most:
             return
         frame = sys._current_frames()[threading.main_thread().ident or 0]  # in which the nodes are
-        why = f"{frozen} suspended" if frozen else f"in {frame.f_code.co_filename}, line {frame.f_lineno}"
+        why = f"{frozen} suspended" if frozen else f"in {_line_of(frame)}"
         name = self._name if frozen else _node_of(frame) or self._name
         if self._beaten - self._said > EVERY_SECONDS:
             self._said = self._beaten
             with suppress(OSError):
-                print(f"[FATAL] [{name}]: blocked for {seconds:.1f} s: {why}", file=sys.stderr, flush=True)
+                level = "FATAL" if self._ends else "ERROR"
+                print(f"[{level}] [{name}]: blocked for {seconds:.1f} s: {why}", file=sys.stderr, flush=True)
         if self._ends:
             tell_parent(name, f"blocked for {seconds:.1f} s: {why}")
             os._exit(1)
+
+
+def _line_of(frame: FrameType) -> str:
+    """The innermost line that is, if possible, not in Python's own library, rclpy or numba."""
+    own: FrameType | None = frame
+    while own is not None and OTHERS.search(own.f_code.co_filename):
+        own = own.f_back
+    own = own or frame
+    return f"{own.f_code.co_filename}, line {own.f_lineno}"
 
 
 def _node_of(frame: FrameType | None) -> str:

@@ -42,6 +42,7 @@ class Controller(PeerNode):
 
     why_read_only = "it is fixed for a run, so that the bag and a replay agree; set it in the scene"
     stays = True
+    _is_loading = False  # the module of its law
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
@@ -49,7 +50,9 @@ class Controller(PeerNode):
         self._side = name.removesuffix("_controller")
         self._monitored = self.read_only("wait_for_monitor")
         law = self.read_only("law")
+        self._is_loading = True
         self._own = OwnLaw(law) if law else None
+        self._is_loading = False
         topic = COMMANDS[self._side]
         self._commands, self._template = self.publisher(topic), template_of(topic)
         self._announcements = self.publisher(CHANGES[self._side])
@@ -70,6 +73,10 @@ class Controller(PeerNode):
     def needs(self) -> Iterator[Need]:
         """The plant; a monitor is the plant's need."""
         yield Need(JOINT_STATES)
+
+    def standing(self) -> float | None:
+        """An import that does not return, or asks at a terminal, has as long as a node that does not come."""
+        return self.start_patience if self._is_loading else super().standing()
 
     def progress(self) -> object:
         """The last state answered."""

@@ -111,9 +111,9 @@ def _at_other_moments() -> list[Drill]:
         Drill("kill-free-controller", group, "SIGKILL of the left controller of a free-running graph",
               _free_running, partial(send, name="left_controller", number=signal.SIGKILL)),
         Drill("kill-one-process", group, "SIGKILL of the one process of `--one-process`", _one_process,
-              partial(send, name="together", number=signal.SIGKILL), seen=LYAPUNOV),
+              partial(send, name="graph", number=signal.SIGKILL), seen=LYAPUNOV),
         Drill("freeze-one-process", group, f"SIGSTOP of the one process of `--one-process`, SIGCONT after"
-              f" {FROZEN_SECONDS:g} s", _one_process, partial(freeze, name="together"), seen=LYAPUNOV),
+              f" {FROZEN_SECONDS:g} s", _one_process, partial(freeze, name="graph"), seen=LYAPUNOV),
         Drill("kill-run-of-one-process", group, "SIGKILL of `grasp run --one-process`", _one_process,
               partial(send, name="grasp run", number=signal.SIGKILL)),
         Drill("ctrl-c-twice", group, "Ctrl-C, and another one while it ends", Stage.run, _twice,
