@@ -3,10 +3,6 @@
 An address in place of a function keeps the observer out of the machine code of the run: a run without an observer is
 compiled without one and loses one comparison for each segment, and neither changes a bit of the motion. The observer is
 called when the segment is over and before its transitions, so that modes and bodies are still those of the segment.
-
-Its memory is a record of arrays behind an address, of which kernels load the fields that they use. As a value a record
-of twenty arrays is 150 numbers. Each function that gets it takes them apart and puts them together, which was half of
-what was compiled for an observer.
 """
 
 from __future__ import annotations
@@ -16,45 +12,16 @@ from typing import Any, ClassVar
 from weakref import finalize
 
 import numpy as np
-from numba.core import cgutils
-from numba.core.types import Type, float64, int64
-from numba.core.typing.templates import AttributeTemplate
-from numba.extending import infer_getattr, lower_getattr_generic, models, register_model
+from numba.core.types import float64, int64
 
 from grasp_ros.exact.compilation.jit import COMPILED, address_of_code, code_of_call, inlined, instruction
+from grasp_ros.exact.compilation.reference import Reference
 from grasp_ros.exact.records import Integers, Segment, Tables
 
 ADDRESS, CONTEXT = 0, 1  # places of an observer
 FINISH, REST = -1, -3  # in place of a kind of segment: after a run, and where nothing moves in an interval
 SIGNATURE = int64(int64, int64, float64, float64, float64, int64)  # of an observer, see `notify`
 _PLAIN: dict[int, Any] = {}  # where nothing is compiled: functions and records by their addresses
-
-
-class Reference(Type):
-    """The type of a record behind its address: a pointer to the numbers of a named tuple."""
-
-    def __init__(self, record: Any) -> None:
-        self.record = record
-        super().__init__(f"Reference({record})")
-
-
-@register_model(Reference)
-class _Pointer(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Reference) -> None:
-        super().__init__(manager, kind, manager.lookup(kind.record).get_data_type().as_pointer())
-
-
-@infer_getattr
-class _Fields(AttributeTemplate):
-    key = Reference
-
-    def generic_resolve(self, reference: Reference, name: str) -> Any:
-        return reference.record.types[reference.record.fields.index(name)]
-
-
-@lower_getattr_generic(Reference)  # type: ignore[untyped-decorator]
-def _field(_: Any, builder: Any, reference: Reference, address: Any, name: str) -> Any:
-    return builder.load(cgutils.gep_inbounds(builder, address, 0, reference.record.fields.index(name)))
 
 
 @instruction(lambda _, address, context, kind, t, s, unit, degree: (int64(int64, *SIGNATURE.args), code_of_call))
