@@ -67,8 +67,8 @@ def rewritten(
 ) -> None:
     """A copy of a file by the library's own writer with its options.
 
-    With a topic beside, all of it so much later, `without` the messages of topics from a time in ns on; `by_topic`: in
-    the order of the topics.
+    With a topic beside, all of it so much later, or earlier from 0 on, `without` the messages of topics from a time in
+    ns on; `by_topic`: in the order of the topics.
     """
     with old.open("rb") as file, new.open("wb") as copy:
         reader, writer, channels = make_reader(file), Writer(copy, **options), dict[int, int]()
@@ -85,7 +85,7 @@ def rewritten(
                 channels[channel.id] = writer.register_channel(channel.topic, channel.message_encoding, of)
                 if beside:
                     writer.register_channel(beside, channel.message_encoding, of)
-            time_ns = message.log_time + late_ns
+            time_ns = max(message.log_time + late_ns, 0)
             writer.add_message(channels[channel.id], time_ns, message.data, time_ns)
             if beside:
                 writer.add_message(channels[channel.id] + 1, time_ns, message.data, time_ns)

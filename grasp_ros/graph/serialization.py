@@ -111,6 +111,11 @@ def raw_stamp_ns(cdr: bytes) -> int:
     return int(sec * NANOSECONDS + nanosec)
 
 
+def has_raw_stamp(cdr: bytes) -> bool:
+    """Whether `raw_stamp_ns` can read a message, which another program may have written."""
+    return len(cdr) >= len(_HEAD) + _STAMP.size and cdr.startswith(_HEAD)
+
+
 def raw_force(cdr: bytes) -> float:
     """Force along the line in N of a serialized WrenchStamped."""
     (length,) = _LENGTH.unpack_from(cdr, len(_HEAD) + _STAMP.size)

@@ -130,10 +130,13 @@ ANEW = [
     ({"compression": CompressionType.NONE, "index_types": IndexType.NONE, "repeat_channels": False,
       "repeat_schemas": False, "use_statistics": False, "use_summary_offsets": False}, "3001 states follow"),
     ({"by_topic": True}, "3001 states follow"),
+    *(({"late_ns": late_ns}, f": time {max(late_ns, 0)} ns in the bag, stamp {max(-late_ns, 0)} ns: another recorder"
+       " wrote it; allowed: a bag") for late_ns in (21, 1_796_000_000 * 10**9, -10**6)),
 ]
 
 
-@pytest.mark.parametrize(("options", "words"), ANEW, ids=["no chunks", "lz4", "no index", "topic by topic"])
+@pytest.mark.parametrize(("options", "words"), ANEW, ids=["no chunks", "lz4", "no index", "topic by topic",
+                                                         "late by 21 ns", "of a wall clock", "early by a tick"])
 def test_a_bag_of_another_make_is_read_or_refused_and_not_called_damaged(
     two_runs: tuple[Path, Path], tmp_path: Path, command: Any, options: dict[str, Any], words: str
 ) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from graphs import written
+from graphs import rewritten, written
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
@@ -216,6 +216,17 @@ def test_a_topic_with_another_scene_than_that_of_the_bag_is_refused(tmp_path: Pa
     assert verify(bag.read(tmp_path / "same")).holds
     with pytest.raises(bag.BagError, match="another scene than in the bag's own record"):
         bag.read(tmp_path / "other")
+
+
+def test_a_bag_with_a_reset_may_be_written_anew(tmp_path: Path) -> None:
+    """From a reset on its times are ahead of the stamps."""
+    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
+    ticks = list(study.ticks_of(run))
+    again = [(ticks[-1][0] + run.scene.period_ns + time_ns, messages, time_ns) for time_ns, messages in ticks]
+    written(tmp_path / "bag", run.scene, [*ticks, *again])
+    rewritten(tmp_path / "bag" / "bag.mcap", tmp_path / "new.mcap")
+    found = bag.read(tmp_path / "new.mcap")
+    assert (found.resets, verify(found).ticks, verify(found).problem) == (1, 22, "")
 
 
 @pytest.mark.parametrize("times", [(0, 1, 1), (0, 2, 1), (0, 1, 0.5)])

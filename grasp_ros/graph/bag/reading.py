@@ -19,11 +19,11 @@ import numpy as np
 from grasp_ros import scene as scenes
 from grasp_ros.graph.bag import BagError, EmptyBagError
 from grasp_ros.graph.bag.opening import UNREADABLE, Opened, decoding_bag
-from grasp_ros.graph.bag.recorder import BESIDE, LOST_RECORD, OWN_RECORD, checksum
+from grasp_ros.graph.bag.recorder import BESIDE, LIBRARY, LOST_RECORD, OWN_RECORD, checksum
 from grasp_ros.graph.bag.recording import Recording, acted_from
 from grasp_ros.graph.bag.rosbag2 import decode
 from grasp_ros.graph.bag.storage import Storage, Stored
-from grasp_ros.graph.serialization import template_of
+from grasp_ros.graph.serialization import has_raw_stamp, raw_stamp_ns, template_of
 from grasp_ros.physics import given
 from grasp_ros.physics.layout import OBJECT
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -34,6 +34,7 @@ from grasp_ros.scene.topics import Numbers, Topic, timing_names
 
 MOST_NS = 2**63 - 1
 LARGEST = 1e100  # of a number: its square is one, too
+OUR_TIMES = "allowed: a bag of `grasp run`, or of its monitor, whose times are simulated ones"
 IN_ORDER = "allowed: ticks of the scene in their order"
 NOT_FINITE = f"a number is not finite, or beyond {LARGEST:g}"
 
@@ -103,10 +104,18 @@ def ticks_of(
 ) -> Iterator[tuple[int, dict[Topic, bytes], list[tuple[Topic, Stored]]]]:
     """Time in ns of each tick, its messages on these topics, and what lies beside them, in the order of the bag.
 
-    A topic has one message for a tick; of more the last one is salvaged.
+    A topic has one message for a tick; of more the last one is salvaged. In a bag that another program has written,
+    times that are not the stamps are refused; until a reset, from which on our own are ahead of them.
     """
     time_ns, tick, beside = 0, dict[Topic, bytes](), list[tuple[Topic, Stored]]()
+    theirs, stamp_ns = not opened.storage.library.startswith(LIBRARY), 0
     for topic, stored in opened.messages:
+        if theirs and topic in wanted and has_raw_stamp(stored.cdr):
+            before_ns, stamp_ns = stamp_ns, raw_stamp_ns(stored.cdr)
+            if before_ns <= stamp_ns != stored.time_ns:
+                raise BagError(f"{opened.path}: {stored.topic}: time {stored.time_ns} ns in the bag, stamp {stamp_ns}"
+                               f" ns: another recorder wrote it; {OUR_TIMES}")
+            theirs = before_ns <= stamp_ns
         if stored.time_ns != time_ns:
             yield time_ns, tick, beside
             time_ns, tick, beside = stored.time_ns, {}, []
