@@ -18,6 +18,8 @@ from processes import DEADLINE, START, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -168,6 +170,18 @@ def test_a_second_plant_on_the_same_topics_is_refused(launch: Any) -> None:
     assert 1 in statuses
     assert "another plant publishes here" in errors[statuses.index(1)]
     assert "Traceback" not in "".join(errors)
+
+
+@pytest.mark.parametrize("reliability", [ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT])
+def test_a_second_clock_is_named(launch: Any, node: tuple[Any, SingleThreadedExecutor], reliability: Any) -> None:
+    """Of any quality of service: readers of time take it."""
+    node[0].create_publisher(Clock, "/clock", QoSProfile(depth=1, reliability=reliability))
+    plant = launch(*START, "plant", "--ros-args", "-p", "scene:=arm_alone", stderr=subprocess.PIPE)
+    words = "; sources: /peer and /plant; use_sim_time jumps between their times\n"
+    said = any("/clock: second sources: " in line and line.endswith(words) for line in plant.stderr)
+    plant.terminate()
+    plant.communicate(timeout=DEADLINE)
+    assert said
 
 
 def test_plant_drops_what_is_stale_repeated_or_not_finite(

@@ -119,6 +119,8 @@ class Plant(PeerNode):
     def report(self) -> None:
         """Publish the counters, and see to it that nobody else plays the plant."""
         self.counters.update(tick=self.tick, resets=self.resets)
+        if len(self.living(CLOCK)) > 1:
+            self.refuse("second sources", CLOCK, "use_sim_time jumps between their times")
         super().report()
         self._insist()
         self.loop.report()

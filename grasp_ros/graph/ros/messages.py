@@ -26,7 +26,7 @@ from grasp_ros.graph.serialization import Template, template_of
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.system import BODIES, NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.topics import JOINT_STATES, SCENE, Topic
+from grasp_ros.scene.topics import CLOCK, JOINT_STATES, SCENE, Topic
 
 TYPES = {
     "sensor_msgs/msg/JointState": JointState,
@@ -58,6 +58,8 @@ def reader_qos(topic: Topic) -> QoSProfile:
     The depth of a reader is shared by all writers of its topic: with the last messages alone, one that floods it would
     push out those of the others. Fast DDS keeps at most 5000 otherwise, and lets the writers wait.
     """
+    if topic == CLOCK:  # whose readers are ROS's own
+        return glance_qos(topic)
     profile = qos(topic)
     if topic.type == SCENE.type:
         profile.depth = max(profile.depth, READER_DEPTH)
