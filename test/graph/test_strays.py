@@ -163,6 +163,28 @@ def test_a_stray_with_the_stamp_of_the_state_neither_acts_nor_is_recorded(
     assert (str(found.answers["left"]), found.same) == ("the scene's law", None)  # and of nobody else
 
 
+CHURN = """
+import rclpy
+from geometry_msgs.msg import WrenchStamped
+rclpy.init()
+node = rclpy.create_node("churn")
+while True:
+    node.destroy_publisher(node.create_publisher(WrenchStamped, "left/effort_command", 10))
+    rclpy.spin_once(node, timeout_sec=0.05)
+"""
+
+
+@pytest.mark.slow  # real processes
+def test_sources_that_come_and_go_are_named_with_their_topic(launch: Any, grasp_run: Any, tmp_path: Path) -> None:
+    run = grasp_run("case_01", "--set", "time.duration_s=1000", "--peer-timeout", "1", "--no-check", "--no-figure")
+    growing(tmp_path / "run" / "bag")
+    launch(sys.executable, "-c", CHURN, stderr=subprocess.DEVNULL)
+    _, err = run.communicate(timeout=DEADLINE)
+    assert run.returncode == 1, err
+    assert re.search("plant: left/effort_command: (2 sources, |sources come and go, seen: ).*/left_controller.*;"
+                     " allowed in lockstep: one;", err)
+
+
 HARD = """
 import rclpy
 from geometry_msgs.msg import WrenchStamped

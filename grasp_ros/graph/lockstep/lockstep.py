@@ -50,6 +50,7 @@ class Lockstep:
         }
         self._limits = Limits(plant, plant.scene)
         self._unsettled: dict[Topic, float] = {}  # topics whose commands do not count, and since when
+        self._seen: set[str] = set()  # their sources, also those that are gone again
 
     def missing(self) -> list[str]:
         """Command topics that do not have exactly one source, with the names of several."""
@@ -96,10 +97,11 @@ class Lockstep:
     def _settle(self, now: float) -> None:
         """Ask again once the sources of the commands are the same for a while, and one of each is alive; or end."""
         for topic, since in tuple(self._unsettled.items()):
+            self._seen.update(self._plant.sources(topic))
             if self._sources[topic].settled() and self._alone(topic):
                 del self._unsettled[topic]
             elif now - since > self._plant.patience:
-                self._refuse_sources(now - since - self._plant.patience)
+                self._refuse_sources(topic, now - since - self._plant.patience)
                 return
         if not self._unsettled:
             self._repeat(now)
@@ -157,12 +159,13 @@ class Lockstep:
                 self._commands.clear()
                 plant.step(forces)
 
-    def _refuse_sources(self, waited: float) -> None:
-        """End the run, with the names of the sources as soon as discovery has them."""
+    def _refuse_sources(self, topic: Topic, waited: float) -> None:
+        """End the run for the sources of a topic, with their names as soon as discovery has them."""
         found = {topic.name: self._plant.sources(topic) for topic in self.topics}
         if waited < NAMES_SECONDS and any(NEW in nodes for nodes in found.values()):
             return
         words = [f"{name}: {len(nodes)} sources, {' and '.join(nodes)}" for name, nodes in found.items()
                  if len(nodes) > 1]
-        self._plant.fail(f"{'; '.join(words) or 'a command topic had two sources'};"
+        gone = f"{topic.name}: sources come and go, seen: {' and '.join(sorted(self._seen - {NEW}))}"
+        self._plant.fail(f"{'; '.join(words) or gone};"
                          " allowed in lockstep: one; else the result depends on timing")
