@@ -53,6 +53,8 @@ REFUSED = [
     ("plant", "-p scene:=table -p left_arm_table.time_s:=3.0", "left_arm_table.time_s: 3.0 is not allowed"),
     ("plant", "-p use_sim_time:=3", "use_sim_time"),
     ("plant", "-p nothing", "ROS does not start: "),
+    ("plant", "-p scene:=", "'-p scene:='. Error: nothing behind :=; it was given "),
+    ("plant", "-r x:=y name", "ROS does not start: unknown arguments ['name']; it was given --ros-args -r x:=y name"),
     ("plant", "--params-file nothing.yaml", "ROS does not start: "),
     ("monitor", "-p bagg:=new", "bagg: no such parameter; did you mean bag?"),
     ("left_controller", "-p wait_for_monitr:=true", "wait_for_monitr: no such parameter; did you mean wait_for_moni"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import os
 import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -16,10 +15,10 @@ from rclpy.signals import SignalHandlerOptions
 
 from grasp_ros.graph.parameters import TOOLS
 from grasp_ros.graph.ros.node import GraspNode
+from grasp_ros.graph.ros.parameter_node import words_of
 from grasp_ros.graph.stopping import end_by_force, note_signals, on_signals, tell_parent
 from grasp_ros.physics.errors import Refused, described
 
-OF_ROS = ("ROS_", "RMW_", "RCUTILS_", "FAST")  # how variables begin that rcl and the middleware read
 # A spin without a time limit burns a core and can hang; one until a future is complete, which does not return between
 # messages, takes less time, and has corrupted the heap of a process.
 POLL_SECONDS = 0.2
@@ -88,10 +87,7 @@ def _start(context: Context) -> None:
     try:
         rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # the base of what rcl raises
-        variables = [f"{name}={value}" for name, value in sorted(os.environ.items()) if name.startswith(OF_ROS)]
-        words = " ".join([*sys.argv[1:], *variables])
-        why = " ".join(str(error).split()).partition(", at /")[0]  # where in rcl
-        raise Refused(f"ROS does not start: {why}; it was given {words}") from None
+        raise Refused(f"ROS does not start: {words_of(error)}") from None
 
 
 def _spin(nodes: Sequence[GraspNode], received: Sequence[int], names: str) -> None:

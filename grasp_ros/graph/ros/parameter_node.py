@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from array import array
 from collections.abc import Callable, Iterator
@@ -26,7 +27,8 @@ from grasp_ros.scene import Scene, strict_yaml
 FILE = "--params-file"
 SIM_TIME = "use_sim_time"  # rclpy lets anybody set it at any time
 KINDS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}  # of parameters
-RCLError = rclpy_implementation.RCLError
+OF_ROS = ("ROS_", "RMW_", "RCUTILS_", "FAST")  # how variables begin that rcl and the middleware read
+RCLError, UnknownArguments = rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError
 
 
 class ParameterNode(Node):
@@ -174,5 +176,15 @@ def refusing() -> Iterator[None]:
     """Refuse what rclpy refuses of parameters and names that are given, and what DDS cannot be, secure for one."""
     try:
         yield
-    except (ParameterException, NameValidationException, RCLError) as error:
+    except (ParameterException, NameValidationException) as error:
         raise Refused(" ".join(str(error).split())) from None
+    except RCLError as error:
+        raise Refused(words_of(error)) from None
+
+
+def words_of(error: RuntimeError) -> str:
+    """What rcl says, without where in it, and what it was given: words of the command line, and variables."""
+    variables = [f"{name}={value}" for name, value in sorted(os.environ.items()) if name.startswith(OF_ROS)]
+    why = " ".join(str(error).split()).partition(", at /")[0].replace("error not set", "nothing behind :=")
+    unknown = "unknown arguments " if isinstance(error, UnknownArguments) else ""
+    return f"{unknown}{why}; it was given {' '.join([*sys.argv[1:], *variables])}"
