@@ -68,7 +68,7 @@ def add_accuracy(sub: Options) -> None:
 
 
 def named(word: str) -> Path:
-    """A path that is no standard output."""
+    """A path that is no standard input or output, nor empty, which would be the working directory."""
     if word in ("", "-"):
         raise argparse.ArgumentTypeError(f"{word!r} is not allowed; allowed: a name")
     return Path(word)

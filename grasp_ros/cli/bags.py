@@ -5,11 +5,10 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
-from grasp_ros.cli.arguments import add_command, add_file, add_json, add_output
+from grasp_ros.cli.arguments import add_command, add_file, add_json, add_output, named
 from grasp_ros.cli.checks import check_output, prepare, warn
 from grasp_ros.cli.output import destination, show
 from grasp_ros.physics.errors import Refused
@@ -23,16 +22,16 @@ MOST_LETTERS = 200  # of the ticks that a recovered bag lacks
 def add_to(commands: Any) -> None:
     """Add the subcommands."""
     sub = add_command(commands, "recover", _recover)
-    sub.add_argument("bag", type=Path, help="directory or file of a bag")
+    sub.add_argument("bag", type=named, help="directory or file of a bag")
     add_output(sub, "DIRECTORY", "new directory for the bag (default: BAG_recovered)")
     sub = add_command(commands, "inspect", _inspect)
-    sub.add_argument("bag", type=Path, help="directory or file of a bag")
+    sub.add_argument("bag", type=named, help="directory or file of a bag")
     add_json(sub)
     add_file(sub, "FILE.csv", "write states, forces and V as a table; - is the standard output")
     sub.add_argument("--replay", action="store_true", help="also verify it, as `grasp verify` does")
     add_limits(sub)
     sub = add_command(commands, "verify", _verify)
-    sub.add_argument("bag", type=Path, help="directory or file of a bag")
+    sub.add_argument("bag", type=named, help="directory or file of a bag")
     add_json(sub)
 
 

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from grasp_ros import scene as scenes
-from grasp_ros.cli.arguments import add_command, add_file, add_json, add_settings, complete_scenes
+from grasp_ros.cli.arguments import add_command, add_file, add_json, add_settings, complete_scenes, named
 from grasp_ros.cli.checks import check_output, load_scene, prepare, warn
 from grasp_ros.cli.output import figure_endings, show, write_figure, write_scene
 from grasp_ros.identification.fit import fit
@@ -20,8 +20,8 @@ from grasp_ros.scene.files import YAML
 def add_to(commands: Any) -> None:
     """Add the subcommand."""
     sub = add_command(commands, "fit", _fit)
-    sub.add_argument("source", metavar="BAG|FILE.npz|FILE.csv", help="a bag, a file of `grasp simulate -o`, or a table"
-                     f" with columns t_s and some of {', '.join(CHANNELS)}")
+    sub.add_argument("source", metavar="BAG|FILE.npz|FILE.csv", type=named, help="a bag, a file of `grasp simulate -o`,"
+                     f" or a table with columns t_s and some of {', '.join(CHANNELS)}")
     sub.add_argument("--free", action="extend", nargs="+", required=True, metavar="KEY",
                      help="numbers to estimate, section.key, or the offset of a sensor, offset.CHANNEL")
     complete_scenes(sub.add_argument("--scene", help="what is known, and where the search starts (default: the scene of"

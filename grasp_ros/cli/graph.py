@@ -15,7 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, sides_of
+from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, named, sides_of
 from grasp_ros.cli.bags import add_limits, check_limits, keeps
 from grasp_ros.cli.checks import load_scene, prepare
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
@@ -64,11 +64,11 @@ def add_to(commands: Any) -> None:
     add_limits(sub)
     _add_network(sub)
     sub = add_command(commands, "replay", _replay)
-    sub.add_argument("bag", type=Path, help="directory or file of a bag")
+    sub.add_argument("bag", type=named, help="directory or file of a bag")
     sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="playback: bag time / wall time (default 1)")
     _add_network(sub)
     sub = add_command(commands, "watch", _watch)
-    sub.add_argument("bag", type=Path, nargs="?", help="a bag; default: the graph that runs")
+    sub.add_argument("bag", type=named, nargs="?", help="a bag; default: the graph that runs")
     sub.add_argument("--rate", type=float, metavar="R", help="playback: bag time / wall time (default 1)")
     sub.add_argument("--from", dest="first", type=float, metavar="S", help="time in the bag to begin at, in s")
     _add_namespace(sub, "of the graph")

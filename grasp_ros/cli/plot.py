@@ -93,7 +93,7 @@ def _motion(source: str, options: argparse.Namespace, span: Span) -> Motion:
 
     path = Path(source)
     with reading(path):
-        directory = path.is_dir()
+        directory = bool(source) and path.is_dir()
     ending = path.suffix.lower()
     recorded = directory or ending in (".npz", ".mcap")
     if recorded and (options.settings or options.sampled or options.method != EXACT or options.step is not None

@@ -31,7 +31,7 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "keys/journal.jsonl": b'{"a": 1}\n', "list/journal.jsonl": b"[]\n", "bytes/journal.jsonl": b"\xff\n",
         "exits.py": b"import sys; sys.exit(0)", "breaks.py": b"raise BrokenPipeError",
         "words/journal.jsonl": b"not JSON\n", "bag/metadata.yaml": b"[" * 20_000,
-        "there.npz/x": b"", "folder.yaml/x": b"", "no.mcap": b"x",
+        "there.npz/x": b"", "folder.yaml/x": b"", "no.mcap": b"x", "packed/x.db3.zstd": b"x", "x.mcap.zstd": b"x",
     }.items():
         Path(name).parent.mkdir(exist_ok=True)
         Path(name).write_bytes(content)
@@ -68,6 +68,15 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         (f"simulate {LONG}.yaml", "cannot be read: File name too long"),
         (f"fit {LONG} --free object.mass_kg", "cannot be read: File name too long"),
         ("simulate folder.yaml", "folder.yaml: is no file"),
+        *((f"{program} {word}", f"argument bag: {word!r} is not allowed; allowed: a name") for word in ("", "-")
+          for program in ("inspect", "verify", "recover", "replay", "watch")),
+        ("plot ", "'': no such scene"),
+        ("fit  --free object.mass_kg", "'' is not allowed; allowed: a name"),
+        *((f"verify {name}", words) for name, words in (
+            ("bag/metadata.yaml", "bag/metadata.yaml: the metadata of a bag; the bag is its directory, bag"),
+            ("packed", "packed: its storage is sqlite3; allowed: MCAP, as `rosbags-convert"),
+            ("packed/x.db3.zstd", "packed/x.db3.zstd: its storage is sqlite3; allowed: MCAP, as `rosbags-convert"),
+            ("x.mcap.zstd", "x.mcap.zstd: its file is compressed as a whole; allowed: chunks, as `rosbags-convert"))),
         ("plot no.mcap", "no.mcap: not a bag of this package"),
         ("fit no.mcap --free object.mass_kg", "no.mcap: not a bag of this package"),
         ("map case_01 --x object.mass_kg=1:2:10^12 -o m.zarr", "then :n for 2 to 1,000,000,000 values"),

@@ -27,6 +27,7 @@ KIND = "a bag of this package"
 MOST_AHEAD = 16  # messages, of which two say what the bag holds
 # What is raised for bytes that are no message, by rosbags the last two.
 UNREADABLE: tuple[type[Exception], ...] = (*DAMAGE, SerdeError, AttributeError)
+PACKED = ".zstd"  # ending of a file that rosbag2 has compressed as a whole
 ZSTD = b"\x28\xb5\x2f\xfd"
 
 
@@ -41,13 +42,15 @@ def open_storage(path: Path, salvage: bool = False) -> Storage:
         files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
         if files and files[0].is_fifo():
             raise BagError(f"{path}: not {KIND}: a pipe; allowed: a file")
-        if len(files) == 1 and files[0].suffix != ".db3":
+        if path.name == "metadata.yaml" and path.is_file():
+            raise BagError(f"{path}: the metadata of a bag; the bag is its directory, {path.parent}")
+        if len(files) == 1 and files[0].suffix not in (".db3", PACKED):
             return Storage(files[0], salvage)
         if any((path / "bag").glob("*.mcap")):
             raise BagError(f"{path}: the directory of a run; its bag is {path / 'bag'}")
-        if any(path.glob("*.db3")) or path.suffix == ".db3":
+        if any(path.glob("*.db3*")) or ".db3" in path.suffixes:
             raise BagError(f"{path}: its storage is sqlite3; allowed: MCAP, {CONVERT}")
-        if any(path.glob("*.mcap.*")):
+        if any(path.glob("*.mcap.*")) or path.suffix == PACKED:
             raise BagError(f"{path}: its file is compressed as a whole; allowed: chunks, {CONVERT}")
         raise BagError(f"{path}: not {KIND}: holds {len(files)} .mcap files; allowed: one")
 
