@@ -76,7 +76,7 @@ def add_to(commands: Any) -> None:
     sub = add_command(commands, "ctl", _ctl)
     sub.add_argument("words", nargs="*", metavar="WORD", help="pause, resume, step [N], reset, status, get NODE"
                      " [NAME ...], set NODE NAME VALUE, echo TOPIC [N], without N until a Ctrl-C; none: a shell that"
-                     " stays connected")
+                     " stays connected, whose exit status is that of its worst line")
     _add_namespace(sub, "of the graph")
     _add_network(sub)
 

@@ -192,7 +192,7 @@ def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
                "step x", "step 0",
                "set left_controller law x", f"set left_controller {gain} -100",
                "set left_controller left_feedback.position_gain 9"]
-    _, err = shell.communicate("\n".join(refused), timeout=DEADLINE)
+    _, err = shell.communicate("\n".join([*refused, "help"]), timeout=DEADLINE)
     for words in ("steps", "not paused; allowed: step", "pause now: not allowed; allowed: pause, resume, step [N]",
                   "nonsense: not allowed", "step x: not allowed; allowed: a whole number >= 1",
                   "step 0: not allowed; allowed: a whole number >= 1", "law: set at the start only",
@@ -202,7 +202,7 @@ def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
                   "allowed: a sum >= 0",
                   "left_feedback.position_gain: no such parameter; did you mean " + gain):
         assert words in err
-    assert shell.returncode == 2  # that of the last line, which nobody takes; of one that fails it is 1
+    assert shell.returncode == 2  # that of the worst line, which nobody takes; of one that fails it is 1
 
 
 def test_a_pause_ends_a_step_that_goes_on(node: tuple[Any, SingleThreadedExecutor], launch: Any) -> None:

@@ -52,7 +52,7 @@ class Remote(GraspNode):
         }
 
     def work(self, received: list[int]) -> bool:
-        """Ask once, or be a shell; the exit code is that of the last answer."""
+        """Ask once, or be a shell; the exit code is that of the answer, or of the worst one."""
 
         def stop(number: int, _: object) -> None:  # also a wait for a line, which Python would go on with
             received.append(number)
@@ -74,7 +74,7 @@ class Remote(GraspNode):
         return True
 
     def shell(self) -> int:
-        """Do what the lines of the standard input ask for, until it ends; the exit status of the last one."""
+        """Do what the lines of the standard input ask for, until it ends; the exit status of the worst one."""
         status, prompt = 0, "grasp> " if sys.stdin.isatty() else ""
         while True:
             print(prompt, end="", flush=True)
@@ -82,7 +82,7 @@ class Remote(GraspNode):
             if not words or words.strip() in FAREWELL:
                 return status
             if words.strip():
-                status = self.do(words.split())
+                status = max(status, self.do(words.split()))
 
     def do(self, words: Sequence[str]) -> int:
         """Do what some words ask for, and print what there is to say; exit status 1 if nobody answers or does it."""
