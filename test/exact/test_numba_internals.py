@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -104,6 +105,29 @@ def test_whoever_waits_for_the_compiler_is_told_once_and_a_quiet_command_says_no
 def test_a_file_that_cannot_be_rebuilt_is_compiled_anew(cached: Path) -> None:
     kernel_cache.write_checked(cached, b"no code at all")
     assert answer(cached, cached.read_bytes()) == (42.0, False)
+
+
+def test_kernels_that_cannot_be_kept_where_they_belong_are_kept_among_temporary_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Each command compiled anew, said that it was for once, and left a directory."""
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    own = tmp_path / f"grasp_ros_{os.getuid()}"
+    for mode, kept in ((0o700, 1), (0o777, 0)):  # where others can write is code of theirs
+        own.mkdir(exist_ok=True)
+        own.chmod(mode)
+        for hits in (0, kept):
+            kernel_cache.cache_directory.cache_clear()
+            kernel_cache.say_compiling.cache_clear()
+            again: Any = jit.door(twice)
+            assert again(21.0) == 42.0
+            assert bool(again.stats.cache_hits) == hits
+            assert "file/grasp_ros cannot be written; NUMBA_CACHE_DIR names a dir" in "".join(caplog.messages) or hits
+            caplog.clear()
+        shutil.rmtree(own)
+    kernel_cache.cache_directory.cache_clear()
 
 
 @pytest.mark.slow

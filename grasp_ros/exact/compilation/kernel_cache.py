@@ -3,8 +3,10 @@
 import hashlib
 import logging
 import os
+import stat
 import tempfile
 import uuid
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -35,13 +37,21 @@ def _base() -> Path:
 
 @cache
 def cache_directory() -> Path:
-    """A writable directory for the kernels of these sources in this place, which is part of their keys."""
+    """A directory for the kernels of these sources in this place, which is part of their keys.
+
+    Where the one that is asked for cannot be made, it is among temporary files, if no other user can write there.
+    """
     name = hashlib.sha256(f"{sources_digest()} {PACKAGE}".encode()).hexdigest()[:16]
     try:
         (_base() / name).mkdir(parents=True, exist_ok=True)
     except OSError:
-        os.environ["NUMBA_CACHE_DIR"] = tempfile.mkdtemp(prefix="grasp_ros")  # for those that this process starts, too
-        (_base() / name).mkdir(parents=True)
+        with suppress(OSError):
+            own = Path(tempfile.gettempdir()) / f"grasp_ros_{os.getuid()}"
+            own.mkdir(0o700, exist_ok=True)
+            found = own.lstat()
+            if (found.st_mode, found.st_uid) == (stat.S_IFDIR | 0o700, os.getuid()):
+                (own / name).mkdir(exist_ok=True)
+                return own / name
     return _base() / name
 
 
@@ -78,7 +88,10 @@ def read_checked(path: Path) -> bytes:
 @cache
 def say_compiling() -> None:
     """Say, once, why something takes long."""
-    LOG.warning("compiling kernels: once after an installation for each kind of work, up to a minute")
+    why = "once after an installation for each kind of work, up to a minute"
+    if not os.access(_base() / cache_directory().name, os.W_OK):
+        why = f"{_base()} cannot be written; NUMBA_CACHE_DIR names a directory that keeps them"
+    LOG.warning("compiling kernels: %s", why)
 
 
 @cache

@@ -104,7 +104,7 @@ class KernelCache(NullCache):
         try:
             content = kernel_cache.read_checked(self._path(signature, target.codegen()))
             return CompileResult._rebuild(target, *pickle.loads(content))
-        except FileNotFoundError:
+        except OSError:  # not there, or no directory that can be read
             kernel_cache.say_compiling()
         except Exception:
             kernel_cache.say_damaged()
