@@ -15,8 +15,8 @@ from grasp_ros.cli.commands import COMMANDS
 from grasp_ros.cli.output import bar, note, show
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
 from grasp_ros.observe.record import Wanted
-from grasp_ros.physics.errors import Refused
-from grasp_ros.scene.files import format_of, needing
+from grasp_ros.physics.errors import Refused, need
+from grasp_ros.scene.files import format_of
 from grasp_ros.simulation.chunk import HORIZONS, SETTLED, STATUSES, Setup, compute
 from grasp_ros.simulation.outcomes import GROUPS, find
 
@@ -55,8 +55,8 @@ def add_to(commands: Any) -> None:
                      help="new directory, or an unfinished map to complete; figures are written next to it")
 
 
-@needing("`grasp map`", "map")
 def _map(options: argparse.Namespace) -> int:
+    need("`grasp map`", "xarray", "zarr", *["scipy"] * bool(options.sample))
     from grasp_ros.maps import figures, store
     from grasp_ros.maps.plan import Plan, read_axis
     from grasp_ros.maps.run import run

@@ -11,11 +11,10 @@ from grasp_ros.identification.measured import FEWEST, INITIAL, Source, measured
 from grasp_ros.identification.numbers import OFFSET, acts, numbers_of
 from grasp_ros.identification.result import CONFIDENCE, Against, Fit, identifiability_of, residual_table
 from grasp_ros.identification.search import FitProblem, first_noise, fitted, mean_square, missed, refine, search
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Refused, need
 from grasp_ros.physics.given import mapping, names, number, truth
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.scene.files import needing
 from grasp_ros.scene.places import check_scene
 from grasp_ros.sensitivity.directions import check_keys
 
@@ -51,8 +50,7 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
     Refused
         If scipy is not installed, the data or the keys are not allowed, or there are too few samples.
     """
-    with needing("a fit", "fit"):
-        import scipy.optimize  # noqa: F401
+    need("a fit", "scipy")
     if scene is not None:
         check_scene(scene)
     free, found = names("free", free), measured(data, scene, truth("by_sensors", by_sensors))

@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 
 from grasp_ros.maps.plan import Plan
 from grasp_ros.maps.store import Store
-from grasp_ros.physics.errors import Refused
-from grasp_ros.scene.files import needing
+from grasp_ros.physics.errors import Refused, need
 from grasp_ros.scene.versions import versions
 from grasp_ros.simulation.chunk import Chunk, compute
 from grasp_ros.simulation.ensemble import Span, chunk_rows, in_threads
@@ -89,8 +88,9 @@ def work(document: str, span: Span) -> tuple[dict[str, str], Chunk]:
 
 def connect(workers: int, scheduler: str) -> Any:
     """A client of a new cluster of so many processes on this machine, or of the scheduler at an address."""
-    with needing("a cluster", "cluster"):
-        from distributed import Client
+    need("a cluster", "distributed")
+    from distributed import Client
+
     if not scheduler:
         ensure_running()  # by itself it would start later, and let a Ctrl-C through to the workers
         before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])  # a Ctrl-C is for us: workers end with us

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from functools import partial
 
 from grasp_ros.exact.integrator import MAX_WORK
@@ -11,7 +10,7 @@ from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, Method
 from grasp_ros.methods.equations import Work
 from grasp_ros.physics import layout
 from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
-from grasp_ros.physics.errors import Refused, allowed
+from grasp_ros.physics.errors import Refused, allowed, need
 from grasp_ros.physics.given import number, text
 from grasp_ros.scene import PAPER, Scene
 
@@ -114,8 +113,8 @@ def check(
             f"{name}: {scene.name} {'; '.join(odd)}; it knows the paper's grasp alone: two arms with feedback to 0, an"
             f" object and both contacts; allowed here: {_able('effects')}"
         )
-    if method.package is not None and importlib.util.find_spec(method.package) is None:
-        raise Refused(f"{name}: needs {method.package}, which is not installed; pip install '.[map]' in the checkout")
+    if method.package is not None:
+        need(name, method.package)
     return value
 
 

@@ -19,12 +19,11 @@ import numpy as np
 
 from grasp_ros.maps.plan import Axis, Plan
 from grasp_ros.observe.record import Wanted
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Refused, need
 from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.given import mapping, names, number, read_number, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.scene.files import needing
 from grasp_ros.simulation.chunk import Setup, check
 from grasp_ros.simulation.ensemble import ensemble
 from grasp_ros.simulation.outcomes import GROUPS, find, wanted_by
@@ -180,8 +179,9 @@ def search(problem: DesignProblem, seed: int = 0, progress: Told | None = None) 
     Where the best choice is unique every seed ends there. `progress` is told the number of simulations so far. Refused:
     no choice was found that keeps the bounds and has the outcome, all have the same one, or scipy is not installed.
     """
-    with needing("`grasp design`", "design"):
-        from scipy.optimize import differential_evolution
+    need("`grasp design`", "scipy")
+    from scipy.optimize import differential_evolution
+
     runs, seed, worst = 0, whole("seed", seed, 0), -np.inf
 
     def function(parts: Array) -> Array:

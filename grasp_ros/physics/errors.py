@@ -54,6 +54,14 @@ class Failed(Refused):
     exit_status = 1
 
 
+def need(what: str, *packages: str) -> None:
+    """Refuse, before any work, where packages are not installed."""
+    from importlib.util import find_spec
+
+    if missing := [name for name in packages if find_spec(name) is None]:
+        raise Refused(f"{what} needs {', '.join(missing)}; pip install {' '.join(missing)}")
+
+
 def allowed(word: str, known: Collection[str], other: str = "") -> str:
     """The end of a refusal: the known word that is meant, or the first that are allowed, behind `other` words."""
     from difflib import SequenceMatcher, get_close_matches  # which what is right need not wait for

@@ -26,17 +26,6 @@ DAMAGE: tuple[type[Exception], ...] = (  # what decoders raise for files that we
 
 
 @contextmanager
-def needing(what: str, extra: str) -> Iterator[None]:
-    """Refuse where a package is not installed that is one of an extra."""
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        if str(error.name).startswith(__package__.partition(".")[0]):
-            raise
-        raise Refused(f"{what} needs {error.name}; pip install '.[{extra}]' in the checkout") from None
-
-
-@contextmanager
 def reading(path: object, refusal: type[Refused] = Refused) -> Iterator[None]:
     """Refuse a path that the system does not let us read, or a text that is not UTF-8."""
     try:

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, Protocol
 import numpy as np
 
 from grasp_ros.physics.energy import Energy
+from grasp_ros.physics.errors import need
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import BODIES, NAMES
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.files import needing, opened
+from grasp_ros.scene.files import opened
 from grasp_ros.scene.parameter import UNITS as KEYS
 
 if TYPE_CHECKING:
@@ -101,8 +102,9 @@ class Tabular:
         Refused
             If xarray is not installed.
         """
-        with needing("dataset()", "data"):
-            import xarray
+        need("dataset()", "xarray")
+        import xarray
+
         values = {TIME.name: self.t, **_values_of(self)}
         return xarray.Dataset({own.name: (TIME.name, values[own.name], {"units": own.unit, "long_name": own.text})
                                 for own in (TIME, *COLUMNS)}, attrs=_attributes_of(self))
@@ -150,8 +152,9 @@ def _attributes_of(motion: Motion) -> dict[str, Any]:
 
 def frame_of(columns: Mapping[str, np.ndarray]) -> Any:
     """A `pandas.DataFrame`; without pandas it is refused."""
-    with needing("dataframe()", "data"):
-        import pandas
+    need("dataframe()", "pandas")
+    import pandas
+
     return pandas.DataFrame(dict(columns))
 
 

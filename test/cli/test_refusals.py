@@ -245,6 +245,36 @@ def test_a_study_without_its_packages_names_the_one_that_is_missing() -> None:
     assert result.stderr == "grasp: this needs gmpy2; run `make laboratory`\n"
 
 
+WITHOUT = """
+import sys
+for name in {missing}:
+    sys.modules[name] = None
+from grasp_ros.{program} import {main}
+sys.exit({main}())
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("missing", "program", "words", "said"),
+    [
+        (["scipy"], "cli.main:grasp", "simulate case_01 --method lsoda", "grasp: lsoda needs scipy; pip install scipy"),
+        (["scipy", "zarr"], "cli.main:grasp", "map case_01 --vary object.mass_kg=1:2 --sample 2 -o x.zarr",
+         "grasp: `grasp map` needs zarr, scipy; pip install zarr scipy"),
+    ],
+)
+def test_a_package_that_is_missing_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, missing: list[str], program: str, words: str, said: str
+) -> None:
+    """A map without zarr compiled, and ran rows; `pip install '.[map]'` helped only in a checkout."""
+    monkeypatch.chdir(tmp_path)
+    module, main = program.split(":")
+    result = ran([sys.executable, "-c", WITHOUT.format(missing=missing, program=module, main=main), *words.split()])
+    assert result.stderr.splitlines()[-1] == said
+    assert result.returncode == 2
+    assert not [*tmp_path.iterdir()]
+
+
 def test_a_module_of_ours_that_is_missing_is_a_fault() -> None:
     def broken(_: Any) -> int:
         raise ModuleNotFoundError("No module named 'grasp_ros.nothing'", name="grasp_ros.nothing")
