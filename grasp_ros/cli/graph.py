@@ -25,7 +25,7 @@ from grasp_ros.graph.parameters import PEER_SECONDS, quoted
 from grasp_ros.graph.processes import Graph, become
 from grasp_ros.graph.running import Running, check_factor
 from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals, on_signals
-from grasp_ros.physics.errors import Failed, Refused
+from grasp_ros.physics.errors import Failed, Refused, need
 from grasp_ros.scene.topics import JOINT_STATES
 
 
@@ -103,6 +103,7 @@ def _reach(options: argparse.Namespace) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    need("this", "rclpy", "mcap", "rosbags", "zstandard")
     _reach(options)
     laws = {f"{side}_controller": place for side, place in sides_of(options.laws).items()}
     scene = load_scene(options.scene, options.settings)

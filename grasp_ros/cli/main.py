@@ -24,7 +24,7 @@ from grasp_ros.cli.commands import COMMANDS, overview
 from grasp_ros.cli.parser import Command, Parser, add_levels, shortened
 from grasp_ros.graph.bag.disk import FULL
 from grasp_ros.graph.stopping import is_signalled, on_signals, raise_on_signals, stop_if_signalled
-from grasp_ros.physics.errors import Refused, described
+from grasp_ros.physics.errors import Refused, described, needing
 
 HELP = f"""\
 Simulate, run, inspect and draw a grasp that collides.
@@ -98,7 +98,8 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
             sys.stdout.reconfigure(errors="backslashreplace")
         if hasattr(options, "quiet"):
             import_module("grasp_ros.cli.output").set_level(options)
-        status = command(options)
+        with needing("this"):
+            status = command(options)
         stop_if_signalled()
         if getattr(options, "verbose", False):
             _say_more(time.monotonic() - begin)

@@ -19,7 +19,7 @@ from typing import Any
 from grasp_ros.graph.host import check_reach, remove_left, this_host
 from grasp_ros.graph.parameters import NODES, PARAMETERS, TOOLS, usage
 from grasp_ros.graph.stopping import STOP_SIGNALS, end_late_by_force, end_with_parent, note_signals
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Refused, needing
 
 
 def main(name: str, child: bool = False) -> int:
@@ -32,13 +32,9 @@ def main(name: str, child: bool = False) -> int:
     if {"-h", "--help"} & set(words):
         print(usage(name))
         return 0
-    try:
-        check_reach(os.environ, alone=name == "graph")
-        if words and name != "graph":
-            raise Refused(f"{' '.join(words)}: not allowed; allowed: --help, or --ros-args -p NAME:=VALUE ...")
-    except Refused as error:
-        print(f"{name}: {error}", file=sys.stderr)
-        return 2
+    check_reach(os.environ, alone=name == "graph")
+    if words and name != "graph":
+        raise Refused(f"{' '.join(words)}: not allowed; allowed: --help, or --ros-args -p NAME:=VALUE ...")
     received: list[int] = []
     note_signals(received)
     end_late_by_force(name, received)
@@ -97,14 +93,11 @@ def start() -> int:
         print(f"{name!r} is no node; allowed: {', '.join(NODES)}", file=sys.stderr)
         return 2
     try:
-        return main(name, is_child)
-    except ModuleNotFoundError as error:
-        package = str(error.name).split(".")[0]
-        if package == "grasp_ros":
-            raise
-        print(f"{name}: the Python package {package} is missing; `pip install .` in the"
-              " checkout brings it", file=sys.stderr)
-        return 1
+        with needing("this"):
+            return main(name, is_child)
+    except Refused as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        return error.exit_status
 
 
 if __name__ == "__main__":

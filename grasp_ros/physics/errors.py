@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from itertools import islice
 from traceback import extract_tb
 
@@ -59,7 +60,18 @@ def need(what: str, *packages: str) -> None:
     from importlib.util import find_spec
 
     if missing := [name for name in packages if find_spec(name) is None]:
-        raise Refused(f"{what} needs {', '.join(missing)}; pip install {' '.join(missing)}")
+        pip = " ".join("ros-jazzy-rclpy" if name == "rclpy" else name for name in missing)
+        raise Refused(f"{what} needs {', '.join(missing)}; pip install {pip}")
+
+
+@contextmanager
+def needing(what: str) -> Iterator[None]:
+    """Refuse where a package turns out not to be installed."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        need(what, str(error.name).partition(".")[0])
+        raise
 
 
 def allowed(word: str, known: Collection[str], other: str = "") -> str:

@@ -261,12 +261,17 @@ sys.exit({main}())
         (["scipy"], "cli.main:grasp", "simulate case_01 --method lsoda", "grasp: lsoda needs scipy; pip install scipy"),
         (["scipy", "zarr"], "cli.main:grasp", "map case_01 --vary object.mass_kg=1:2 --sample 2 -o x.zarr",
          "grasp: `grasp map` needs zarr, scipy; pip install zarr scipy"),
+        (["mcap"], "cli.main:grasp", "inspect none", "grasp: this needs mcap; pip install mcap"),
+        (["zstandard"], "cli.main:grasp", "verify none", "grasp: this needs zstandard; pip install zstandard"),
+        (["rclpy", "rosbags"], "cli.main:grasp", "run case_01 -o x",
+         "grasp: this needs rclpy, rosbags; pip install ros-jazzy-rclpy rosbags"),
+        (["mcap"], "graph.__main__:start", "monitor", "monitor: this needs mcap; pip install mcap"),
     ],
 )
 def test_a_package_that_is_missing_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, missing: list[str], program: str, words: str, said: str
 ) -> None:
-    """A map without zarr compiled, and ran rows; `pip install '.[map]'` helped only in a checkout."""
+    """A bag was a traceback; a map without zarr compiled, and ran rows."""
     monkeypatch.chdir(tmp_path)
     module, main = program.split(":")
     result = ran([sys.executable, "-c", WITHOUT.format(missing=missing, program=module, main=main), *words.split()])
