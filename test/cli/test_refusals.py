@@ -236,6 +236,16 @@ def test_a_title_that_the_terminal_cannot_show_is_printed_all_the_same(
     assert "\\xe4" in result.stdout
 
 
+@pytest.mark.parametrize("program", ["cli simulate case_01", "cli run case_01 --one-process", "graph plant"])
+def test_threads_that_numba_cannot_start_are_refused(monkeypatch: pytest.MonkeyPatch, program: str) -> None:
+    """It was a traceback of numba's."""
+    monkeypatch.setenv("NUMBA_NUM_THREADS", "0")
+    result = ran([sys.executable, "-m", *f"grasp_ros.{program}".split()])
+    assert result.stderr.endswith(": NUMBA_NUM_THREADS: 0 is not allowed; allowed: a whole number >= 1\n")
+    assert "Traceback" not in result.stderr
+    assert result.returncode == 2
+
+
 @pytest.mark.slow
 def test_a_study_without_its_packages_names_the_one_that_is_missing() -> None:
     program = ("import sys; sys.modules['gmpy2'] = None; from lab.__main__ import main;"
