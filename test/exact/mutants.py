@@ -23,7 +23,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 os.environ["NUMBA_DISABLE_JIT"] = "1"
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path[:0] = map(str, Path(__file__).parents[1:3])  # tests and checkout, whatever is installed
 
 ROOM = "grasp_ros.exact"
 MODULES = ("automaton.modes", "automaton.edge", "automaton.begin")

@@ -12,10 +12,14 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
+import sys
+from pathlib import Path
 
 import llvmlite
 import numba
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[2]))  # the checkout, whatever is installed
 
 from grasp_ros import scene
 from grasp_ros.simulation import Trajectory, simulate

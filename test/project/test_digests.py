@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +15,17 @@ FILE = Path(__file__).with_name("digests.json")
 RECORD = "python test/project/digests.py > test/project/digests.json"
 
 LOOSE = 1e-6  # of the largest number of a state: what the scenes make of last bits that differ is far less
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("script", ["project/digests.py", "exact/mutants.py"])
+def test_a_script_measures_the_checkout_that_it_stands_in(tmp_path: Path, script: str) -> None:
+    """What was installed was measured, before and after a change."""
+    code = "import runpy, sys; runpy.run_path(sys.argv[1]); import grasp_ros; print(grasp_ros.__file__)"
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    found = subprocess.run([sys.executable, "-c", code, FILE.parents[1] / script], cwd=tmp_path, env=environment,
+                           capture_output=True, text=True, timeout=60.0, check=True)
+    assert Path(found.stdout.strip()) == FILE.parents[2] / "grasp_ros" / "__init__.py"
 
 
 @pytest.mark.slow
