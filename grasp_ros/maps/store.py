@@ -23,6 +23,7 @@ from grasp_ros.simulation.ensemble import Span
 from grasp_ros.simulation.outcomes import find
 
 FORMAT, STATUS, NOT_DONE = "grasp_ros map", "status", -1
+ZARR = (AttributeError,)  # of zarr, where metadata are of another type
 ALL_FILES = {"array.write_empty_chunks": True}  # of zarr: by itself it leaves out chunks of which all is nan
 
 
@@ -43,12 +44,13 @@ class Store:
                 if not path.exists():  # otherwise another process has made it meanwhile
                     raise
         self._group = open_group(path, "r+")
-        for what, own in (("plan", wanted), ("versions", versions())):
-            found = self._group.attrs[what]
-            other = ", ".join(key for key in own if found.get(key) != own[key])
-            if other:
-                allowed = "a new path, or a map of the same"
-                raise Refused(f"{self.path}: a map of another {what} ({other}); allowed: {allowed}")
+        made, allowed = self._group.attrs["versions"], "allowed: a new path, or a map of the same"
+        other = [key for key in wanted if self._group.attrs["plan"].get(key) != wanted[key]]
+        if other:
+            raise Refused(f"{path}: a map of another plan ({', '.join(other)}); {allowed}")
+        other = [f"{key} {made.get(key)}, not {own}" for key, own in versions().items() if made.get(key) != own]
+        if other:
+            raise Refused(f"{path}: a map that was made with {', '.join(other)}; {allowed}")
 
     @property
     def spans(self) -> list[Span]:
@@ -73,7 +75,7 @@ def _create(path: Path, plan: Plan, document: dict[str, Any], height: int) -> No
     """A new file: columns without values, coordinates, and all that the values depend on."""
     import zarr
 
-    names = ("row",) if plan.sample else tuple(axis.name for axis in plan.axes)
+    names = _dimensions(plan)
     with replaced(path) as part, zarr.config.set(ALL_FILES):
         path.parent.mkdir(parents=True, exist_ok=True)
         group = zarr.create_group(part, zarr_format=3, attributes={
@@ -95,16 +97,39 @@ def open_group(path: Path, mode: str = "r") -> Any:
     """The Zarr group of a map; what is none, or damaged, is refused."""
     import zarr
 
-    with decoding(path, "a map", also=(AttributeError,)):
+    with decoding(path, "a map", also=ZARR):
         group = zarr.open_group(path, mode=mode, zarr_format=3)  # version 2 has arrays that are code
         if group.attrs.get("format") != FORMAT:
             raise Refused(f"{path}: not a map; allowed: a new path, or what `grasp map` has written")
         missing = [name for name in (*_columns(group), *_axes(group)) if not (path / name / "zarr.json").is_file()]
-        missing += ["versions"] if "versions" not in group.attrs else []
-        missing = missing or [name for name in _axes(group) if group[name].nchunks_initialized < group[name].nchunks]
+        missing += ["versions"] if not isinstance(group.attrs.get("versions"), dict) else []
+        if not missing:
+            _check(group, path)
+            missing = [name for name in _axes(group) if group[name].nchunks_initialized < group[name].nchunks]
         if missing:
             raise Refused(f"{path}: a damaged map: without {', '.join(missing)}; allowed: a whole one")
     return group
+
+
+def _check(group: Any, path: Path) -> None:
+    """Refuse a column or an axis that is not what `_create` makes, by its name."""
+    plan = Plan.from_document(group.attrs["plan"])
+    names, columns = _dimensions(plan), _columns(group)
+    sizes, height = dict(zip(names, plan.shape, strict=True)), None
+    for name in (*reversed(columns), *_axes(group)):
+        with decoding(path / name, "a whole part of a map", also=ZARR):
+            own, its = group[name], (name,) if name in sizes else names
+            shape, kind = tuple(sizes[each] for each in its), np.dtype("i1" if name == STATUS else "f8")
+            height = height or own.chunks[0]  # of the status
+            chunks = (height, *shape[1:]) if name in columns else own.chunks
+            if (own.shape, own.dtype, own.metadata.dimension_names, own.chunks) != (shape, kind, its, chunks):
+                raise Refused("its shape, type, dimensions or chunks are others")
+            if not isinstance(own.attrs.get("units"), str) and name in columns and name != STATUS:
+                raise Refused("it has no unit")
+
+
+def _dimensions(plan: Plan) -> tuple[str, ...]:
+    return ("row",) if plan.sample else tuple(axis.name for axis in plan.axes)
 
 
 def _columns(group: Any) -> list[str]:
@@ -132,7 +157,7 @@ def read(path: str | os.PathLike[str]) -> Any:
     path = Path(path)
     group = open_group(path)
     height, names = group[STATUS].chunks[0], _columns(group)
-    with decoding(path, "a map"):
+    with decoding(path, "a map", also=ZARR):
         data = xarray.open_zarr(path, consolidated=False, chunks=None, zarr_format=3)[[*names, *_axes(group)]]
         for name in _axes(group):
             data[name].load()

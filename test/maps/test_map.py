@@ -10,8 +10,11 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial, reduce
+from operator import getitem
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -165,7 +168,9 @@ def test_a_damaged_map_is_refused(tmp_path: Path) -> None:
     run(plan, path)
     for file, content, words in (
         ("settling_time/zarr.json", None, "a damaged map: without settling_time; allowed: a whole one"),
-        (f"{GAIN}/c/0", None, f"a damaged map: without {GAIN}"), ("settling_time/zarr.json", b"{", "not a map"),
+        (f"{GAIN}/c/0", None, f"a damaged map: without {GAIN}"),
+        ("settling_time/zarr.json", b"{", "settling_time: not a whole part of a map"),
+        (f"{GAIN}/zarr.json", b"{}", f"{GAIN}: not a whole part of a map"),
         ("settling_time/c/0/0", b"cut off", "settling_time: not a whole column; delete its `c`, and the same command"),
         ("status/c/0/0", "flipped", "status: not a whole column"), (f"{GAIN}/c/0", "flipped", "not a map"),
         ("zarr.json", b"{", "not a map"),
@@ -180,6 +185,38 @@ def test_a_damaged_map_is_refused(tmp_path: Path) -> None:
             read(path)
         (path / file).write_bytes(before)
     read(path)
+
+
+def places(node: Any, way: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """The way to each value of a JSON document."""
+    for key in node if isinstance(node, dict) else range(len(node)) if isinstance(node, list) else ():
+        yield (*way, key)
+        yield from places(node[key], (*way, key))
+
+
+@pytest.mark.slow
+def test_metadata_of_another_type_are_refused_or_say_the_same(tmp_path: Path, tiny_chunks: None) -> None:
+    """Some were a traceback, also where a chunk was lost."""
+    path, plan = tmp_path / "map.zarr", small_plan(2)
+    run(plan, path)
+    (path / "settling_time" / "c" / "3" / "0").unlink()
+    whole, answers = read(path), set()
+    for file in (path / name / "zarr.json" for name in ("", "settling_time", STATUS, GAIN)):
+        before = file.read_text()
+        for way in places(json.loads(before)):
+            document = json.loads(before)
+            *above, last = way
+            node = reduce(getitem, above, document)
+            node[last] = 1 if isinstance(node[last], str) else "x"
+            file.write_text(json.dumps(document))
+            for answer in (read, partial(Store, plan=plan, rows=1)):
+                try:
+                    found = answer(path)
+                    answers.add(not isinstance(found, xarray.Dataset) or found.equals(whole))
+                except Refused as error:
+                    answers.add(str(error).startswith(f"{file.parent}: "))
+        file.write_text(before)
+    assert answers == {True}
 
 
 @pytest.mark.slow
@@ -198,11 +235,15 @@ def test_what_is_something_else_is_left_alone(tmp_path: Path) -> None:
     plan = small_plan()
     run(plan, tmp_path / "map.zarr")
     other = Plan(plan.scene, plan.setup._replace(accuracy=1e-12), plan.axes)
+    old = json.loads((shutil.copytree(tmp_path / "map.zarr", tmp_path / "old.zarr") / "zarr.json").read_text())
+    old["attributes"]["versions"]["numpy"] = "1.0"
+    (tmp_path / "old.zarr" / "zarr.json").write_text(json.dumps(old))
     (tmp_path / "text").write_text("mine")
     (tmp_path / "directory").mkdir()
     (tmp_path / "directory" / "mine").write_text("mine")
     for path, asked, words in (
         (tmp_path / "text", plan, "not a map"), (tmp_path / "directory", plan, "not a map"),
+        (tmp_path / "old.zarr", plan, r"a map that was made with numpy 1\.0, not .*; allowed: a new path, or a map of"),
         (tmp_path / "map.zarr", other, r"a map of another plan \(setup\); allowed: a new path"),
         (tmp_path / "nowhere" / "\0", plan, "cannot be written|not a map|null byte"),
     ):
