@@ -76,4 +76,4 @@ $(VENV)/ready: pyproject.toml setup.py constraints.txt
 	touch $@
 
 clean:
-	rm -rf build install log *.egg-info $(VENV) $(VENV)-lowest
+	rm -rf build install log site *.egg-info .*_cache .hypothesis $(VENV) $(VENV)-lowest

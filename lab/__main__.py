@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from grasp_ros.cli.main import run
-from grasp_ros.cli.parser import Command
+from grasp_ros.cli.parser import Command, Parser
 from grasp_ros.physics.errors import Refused
 from lab.commands import COMMANDS
 
@@ -24,8 +24,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     program = "python -m lab"
-    parser = argparse.ArgumentParser(usage=f"{program} NAME [options]", description=ABOUT)
-    names = parser.add_subparsers(prog=program, title="studies", required=True, metavar="name, and what")
+    parser = Parser(prog=program, usage=f"{program} NAME [options]", description=ABOUT)
+    names = parser.add_subparsers(prog=program, title="studies", required=True, metavar="name")
     for command in COMMANDS:
         sub = command.add(names)
         sub.set_defaults(command=partial(with_packages, sub.get_default("command")))

@@ -94,8 +94,10 @@ def _hard(options: Options) -> int:
 
 def _fuzz(options: Options) -> int:
     from lab.drills import fuzz, random_scenes
+    from lab.studies import pages
 
     seconds = _seconds(options.seconds, options.draws)
+    pages.claim(options.output / "scene.yaml")
     prepare()
     memory = None if options.docs is None else random_scenes.Kept(options.output, options.seed)
     book = fuzz.run(options.seed, options.output, seconds=seconds, draws=options.draws, first=options.first,
@@ -115,8 +117,10 @@ def _seconds(seconds: float | None, count: int | None) -> float | None:
 
 def _readers(options: Options) -> int:
     from lab.drills import parser_fuzzing
+    from lab.studies import pages
 
     seconds = _seconds(options.seconds, options.count)
+    pages.claim(options.output / "file")
     prepare()
     broken = parser_fuzzing.run(
         options.output, seed=options.seed, first=options.first, count=options.count, seconds=seconds)

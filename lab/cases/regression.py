@@ -17,6 +17,7 @@ import numpy as np
 from gmpy2 import mpfr
 
 from grasp_ros import scene as scenes
+from grasp_ros.cli.parser import Parser
 from grasp_ros.exact.integrator import Status
 from grasp_ros.physics.domain import LARGEST_POSITION
 from grasp_ros.physics.layout import EPS
@@ -183,4 +184,6 @@ def main(chosen: Sequence[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    parser = Parser(prog="python -m lab.cases.regression")
+    parser.add_argument("names", nargs="+", choices=names(), metavar="NAME")
+    sys.exit(main(parser.parse_args().names))

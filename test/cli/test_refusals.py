@@ -166,6 +166,9 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("lab fuzz --seed -1", "--seed: -1 is not allowed"),
         ("lab fuzz --draws 0", "--draws: 0 is not allowed"),
         ("lab fuzz --jobs 0", "--jobs: 0 is not allowed"),
+        ("lab fuzz --draws 1 -o file/x", "file/x/scene.yaml: cannot be written: Not a directory"),
+        ("lab readers --count 1 -o file/x", "file/x/file: cannot be written: Not a directory"),
+        ("lab nosuch", "argument name: nosuch is not allowed; allowed: paper, domain, "),
         ("lab steering nothing", "nothing: no such scene"),
     ],
 )
@@ -243,6 +246,14 @@ def test_threads_that_numba_cannot_start_are_refused(monkeypatch: pytest.MonkeyP
     result = ran([sys.executable, "-m", *f"grasp_ros.{program}".split()])
     assert result.stderr.endswith(": NUMBA_NUM_THREADS: 0 is not allowed; allowed: a whole number >= 1\n")
     assert "Traceback" not in result.stderr
+    assert result.returncode == 2
+
+
+@pytest.mark.slow
+def test_a_regression_scene_that_is_not_there_is_refused() -> None:
+    """It was a traceback."""
+    result = ran([sys.executable, "-m", "lab.cases.regression", "back_to_a_touching_rests"])
+    assert result.stderr.endswith("back_to_a_touching_rests is not allowed; did you mean back_to_a_touching_rest?\n")
     assert result.returncode == 2
 
 

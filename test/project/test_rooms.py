@@ -27,6 +27,13 @@ def test_imports_keep_the_contracts() -> None:
     assert broken(ROOT) == []
 
 
+def test_what_is_made_is_cleaned() -> None:
+    """All that git ignores in the checkout but results of runs."""
+    recipe = (ROOT / "Makefile").read_text().split("\nclean:\n")[1].replace("$(VENV)", ".venv").split()
+    ignored = re.findall(r"^/(.+)/$", (ROOT / ".gitignore").read_text(), re.M)
+    assert [name for name in ignored if not any(map(Path(name).match, recipe))] == ["runs", "fuzz"]
+
+
 def test_a_forbidden_import_is_seen(tmp_path: Path) -> None:
     for room in ("grasp_ros", "lab", "pyproject.toml"):
         source = ROOT / room
