@@ -31,7 +31,7 @@ def test_every_effect_has_a_scene() -> None:
 @pytest.mark.parametrize("name", scenes.names())
 def test_scenes_say_what_to_watch_for_and_survive_a_round_trip(name: str) -> None:
     scene = scenes.load(name)
-    assert len(scene.watch) > 40
+    assert len(scene.watch) > 40, f"{name}: watch says in more than 40 letters what to look at"
     assert scenes.parse(scene.to_yaml(), name, name) == scene
 
 
