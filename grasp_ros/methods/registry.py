@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import partial
 
-from grasp_ros.exact.integrator import MAX_WORK
-from grasp_ros.methods import discrete_gradient, exact, fixed_step, library
-from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, Method
+from grasp_ros.exact.integrator import MAX_WORK, Integrator
+from grasp_ros.methods import discrete_gradient, fixed_step, library
+from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, Method, Problem, Solution
 from grasp_ros.methods.equations import Work
 from grasp_ros.physics import layout
 from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
@@ -28,6 +28,19 @@ _HAIRER = "Hairer, Norsett, Wanner, Solving ODEs I"
 _STIFF = "Hairer, Wanner, Solving ODEs II"
 _INSIDE = "nothing: the events are inside the right-hand side"
 _RESTART = "frozen mode; terminal events of scipy, which it looks for at the ends of its steps; restart after each"
+
+
+def _exact(problem: Problem) -> Solution:
+    """The method of this package; inputs that change on the way are driven from outside."""
+    integrator = Integrator(
+        problem.system, continuous=not problem.sampled, accuracy=problem.setting, max_events=problem.max_events,
+        max_work=problem.max_work,
+    )
+    integrator.progress = problem.progress
+    drive = problem.drive or (lambda free: free.advance(problem.duration, problem.grid))
+    states = drive(integrator)
+    return Solution(states, integrator.event_table, integrator.work, integrator.status, integrator.stop,
+                    integrator.at_rest)
 
 
 def _fixed(name: str, order: str, source: str, at_touch: str, rule: int) -> Method:
@@ -54,7 +67,7 @@ METHODS: dict[str, Method] = {
         Method(
             EXACT, "any, by the accuracy", "this package: grasp_ros/exact",
             "closed-form flight to the touch, which cannot be missed; Taylor series in w = sqrt(u) through the contact",
-            ACCURACY_KNOB, ACCURACY, _tens(3, 16), FINEST, COARSEST, exact.solve, layout.Work,
+            ACCURACY_KNOB, ACCURACY, _tens(3, 16), FINEST, COARSEST, _exact, layout.Work,
             events=True, effects=True, sampled=True, work_budget=True, energy_check=True,
         ),
         _fixed(
