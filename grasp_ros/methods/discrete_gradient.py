@@ -27,10 +27,8 @@ from grasp_ros.exact.impact import energy_quotient
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.equations import SLIVER, Work, parameters
-from grasp_ros.physics.layout import EPS
+from grasp_ros.physics.layout import EPS, Outcome
 
-DONE, NOT_FINITE, NOT_SOLVED = 0, 1, 2
-_STATUS = (Status.DONE, Status.NOT_FINITE, Status.STALLED)
 MOST_ITERATIONS = 100
 
 
@@ -39,7 +37,7 @@ def solve(problem: Problem) -> Solution:
     q, y = parameters(problem.system), tuple(problem.system.state.tolist())
     out, work = np.empty((len(problem.grid), 6)), np.zeros(len(Work), dtype=np.int64)
     outcome, rows = run(q, y, problem.duration, problem.grid, problem.setting, out, work)
-    return Solution(out[:rows], np.empty((0, 5)), work, _STATUS[outcome])
+    return Solution(out[:rows], np.empty((0, 5)), work, Status[Outcome(outcome).name])
 
 
 @kernel
@@ -135,9 +133,9 @@ def run(q: Any, y: Any, duration: float, grid: Any, step: float, out: Any, work:
         work[Work.STEPS] += 1
         total = z[0] + z[1] + z[2] + z[3] + z[4] + z[5]
         if not math.isfinite(total):
-            return NOT_SOLVED if math.isnan(total) else NOT_FINITE, row
+            return Outcome.STALLED if math.isnan(total) else Outcome.NOT_FINITE, row
         while row < grid.shape[0] and grid[row] <= end:
             out[row] = within(y, z, h, (grid[row] - t) / (end - t))
             row += 1
         y, t = z, end
-    return DONE, row
+    return Outcome.DONE, row

@@ -13,10 +13,8 @@ from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of, Pair, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
 
-OPEN, CONTACT, CLAMPED = int(Pair.OPEN), int(Pair.CONTACT), int(Pair.CLAMPED)
 MAX_IDLE = 100  # events without progress in time
 SLIVER = 1e-9  # of a step: what rounding may leave at the end of the horizon
-TOUCH, RELEASE, CLAMP, REENTRY = (int(kind) for kind in tuple(Transition)[:4])
 
 
 class Work(IntEnum):
@@ -63,19 +61,19 @@ def relative(y: Any, side: int) -> Any:
 
 
 @kernel
-def condition(q: Any, y: Any, side: int) -> int:
+def condition(q: Any, y: Any, side: int) -> Pair:
     """Mode of one pair by (10): OPEN, CONTACT, or CLAMPED (u >= 0 and u' < -1/p)."""
     u, d = relative(y, side)
     if not u >= 0.0:
-        return OPEN
-    return CONTACT if damping_factor(q[4 + 5 * side], d) >= 0.0 else CLAMPED
+        return Pair.OPEN
+    return Pair.CONTACT if damping_factor(q[4 + 5 * side], d) >= 0.0 else Pair.CLAMPED
 
 
 @kernel
-def kind_of(before: int, after: int) -> int:
+def kind_of(before: int, after: int) -> Transition:
     """Event between two modes of one pair."""
-    if after == OPEN:
-        return RELEASE
-    if before == OPEN:
-        return TOUCH
-    return CLAMP if after == CLAMPED else REENTRY
+    if after == Pair.OPEN:
+        return Transition.RELEASE
+    if before == Pair.OPEN:
+        return Transition.TOUCH
+    return Transition.CLAMP if after == Pair.CLAMPED else Transition.REENTRY

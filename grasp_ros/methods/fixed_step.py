@@ -28,25 +28,11 @@ from grasp_ros.exact.compilation.jit import allocating, kernel
 from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.contract import Problem, Solution
-from grasp_ros.methods.equations import (
-    CLAMPED,
-    CONTACT,
-    MAX_IDLE,
-    OPEN,
-    SLIVER,
-    Work,
-    condition,
-    kind_of,
-    parameters,
-    rates,
-    relative,
-)
-from grasp_ros.physics.layout import EPS, LEFT, RIGHT, Body
+from grasp_ros.methods.equations import MAX_IDLE, SLIVER, Work, condition, kind_of, parameters, rates, relative
+from grasp_ros.physics.layout import EPS, LEFT, RIGHT, Body, Outcome, Pair, Transition
 
 PLAIN, PAPER, LOCATED = 0, 1, 2
 MOST_EVENTS = 10**6  # rows of memory, which is only taken where it is written
-DONE, NOT_FINITE, EVENTS_FULL, STALLED = range(4)
-_STATUS = (Status.DONE, Status.NOT_FINITE, Status.EVENT_BUDGET, Status.STALLED)
 
 
 def solve(rule: int, problem: Problem) -> Solution:
@@ -55,7 +41,8 @@ def solve(rule: int, problem: Problem) -> Solution:
     out, work = np.empty((len(problem.grid), 6)), np.zeros(len(Work), dtype=np.int64)
     events = np.empty((0 if rule == PLAIN else min(problem.max_events, MOST_EVENTS), 5))
     outcome, rows, found = run(rule, q, y, problem.duration, problem.grid, problem.setting, out, events, work)
-    return Solution(out[:rows], events[:found].copy(), work, _STATUS[outcome])
+    status = Status.EVENT_BUDGET if outcome == Outcome.EVENTS_FULL else Status[Outcome(outcome).name]
+    return Solution(out[:rows], events[:found].copy(), work, status)
 
 
 @kernel
@@ -76,10 +63,10 @@ def hermite(y: Any, f: Any, z: Any, g: Any, h: float, theta: float) -> Any:
 
 
 @kernel
-def note(events: Any, count: int, time: float, side: Body, kind: int, y: Any) -> None:
+def note(events: Any, count: int, time: float, side: Body, kind: Transition, y: Any) -> None:
     """Write one row of the record of events."""
     u, d = relative(y, side)
-    events[count, 0], events[count, 1], events[count, 2] = time, side.value, kind
+    events[count, 0], events[count, 1], events[count, 2] = time, side.value, kind.value
     events[count, 3], events[count, 4] = u, d
 
 
@@ -97,7 +84,7 @@ def linear_fraction(q: Any, y: Any, z: Any, side: int, before: int, after: int) 
     """Where between y and z one pair's condition changes, by linear interpolation of u or of u' + 1/p."""
     u, d = relative(y, side)
     u_end, d_end = relative(z, side)
-    if before == OPEN or after == OPEN:
+    if before == Pair.OPEN or after == Pair.OPEN:
         first, last = u, u_end
     else:
         first, last = d + 1.0 / q[4 + 5 * side], d_end + 1.0 / q[4 + 5 * side]
@@ -110,20 +97,20 @@ def linear_fraction(q: Any, y: Any, z: Any, side: int, before: int, after: int) 
 def distance(q: Any, y: Any, side: int, mode: int, after: int) -> float:
     """Event function between two modes of one pair: negative before, positive after."""
     u, d = relative(y, side)
-    if mode == OPEN:
+    if mode == Pair.OPEN:
         return u
-    if after == OPEN:
+    if after == Pair.OPEN:
         return -u
     rest = damping_factor(q[4 + 5 * side], d)
-    return -rest if after == CLAMPED else rest
+    return -rest if after == Pair.CLAMPED else rest
 
 
 @kernel
-def next_mode(q: Any, y: Any, side: int, mode: int) -> int:
+def next_mode(q: Any, y: Any, side: int, mode: Pair) -> Pair:
     """Mode that a frozen pair should have at y; its own if nothing has happened."""
-    other = CONTACT if mode != CONTACT else CLAMPED
-    if mode != OPEN and distance(q, y, side, mode, OPEN) > 0.0:
-        return OPEN
+    other = Pair.CONTACT if mode != Pair.CONTACT else Pair.CLAMPED
+    if mode != Pair.OPEN and distance(q, y, side, mode, Pair.OPEN) > 0.0:
+        return Pair.OPEN
     return other if distance(q, y, side, mode, other) > 0.0 else mode
 
 
@@ -134,7 +121,7 @@ def root_fraction(q: Any, y: Any, f: Any, h: float, mode: Any, side: int, after:
     at_low = distance(q, y, side, mode[side], after)
     if at_low >= 0.0:
         return 0.0
-    z = rk4(q, mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT, y, f, h)
+    z = rk4(q, mode[LEFT] == Pair.CONTACT, mode[RIGHT] == Pair.CONTACT, y, f, h)
     at_high = distance(q, z, side, mode[side], after)
     kept = 0  # end of the bracket that stayed last time
     for k in range(200):
@@ -143,7 +130,7 @@ def root_fraction(q: Any, y: Any, f: Any, h: float, mode: Any, side: int, after:
             theta = 0.5 * (low + high)
         if high - low <= 4.0 * EPS * high or not low < theta < high:
             break
-        z = rk4(q, mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT, y, f, theta * h)
+        z = rk4(q, mode[LEFT] == Pair.CONTACT, mode[RIGHT] == Pair.CONTACT, y, f, theta * h)
         work[Work.RIGHT_HAND_SIDES] += 3
         work[Work.EVENT_EVALUATIONS] += 1
         value = distance(q, z, side, mode[side], after)
@@ -161,12 +148,12 @@ def root_fraction(q: Any, y: Any, f: Any, h: float, mode: Any, side: int, after:
 @kernel
 def first_transition(rule: int, q: Any, y: Any, f: Any, z: Any, h: float, mode: Any, free: Any, work: Any) -> Any:
     """Fraction, side and next mode of the first event in a step from y to z; a fraction of 2 if there is none."""
-    best, where, then = 2.0, LEFT, OPEN
+    best, where, then = 2.0, LEFT, Pair.OPEN
     for side in (LEFT, RIGHT):
         if not free[side]:
             continue
         after = condition(q, z, side) if rule == PAPER else next_mode(q, z, side, mode[side])
-        same_force = rule == PAPER and after != CONTACT and mode[side] != CONTACT
+        same_force = rule == PAPER and after != Pair.CONTACT and mode[side] != Pair.CONTACT
         if after == mode[side] or same_force:
             continue
         if rule == PAPER:
@@ -214,7 +201,7 @@ def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out:
     mode, free = np.zeros(2, dtype=np.int64), np.ones(2, dtype=np.bool_)
     changed = np.full(2, -1.0)  # time of the last event
     for side in (LEFT, RIGHT):
-        mode[side] = CONTACT if rule == PLAIN else condition(q, y, side)
+        mode[side] = Pair.CONTACT if rule == PLAIN else condition(q, y, side)
     while row < grid.shape[0] and grid[row] <= 0.0:
         out[row] = y
         row += 1
@@ -227,10 +214,10 @@ def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out:
         if rule == PAPER:
             found = renew_modes(q, y, t, mode, changed, events, found)
             if found < 0:
-                return EVENTS_FULL, row, events.shape[0]
+                return Outcome.EVENTS_FULL, row, events.shape[0]
         while t < end:
             h = end - t
-            push_l, push_r = mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT
+            push_l, push_r = mode[LEFT] == Pair.CONTACT, mode[RIGHT] == Pair.CONTACT
             f = rates(q, push_l, push_r, y)
             z = rk4(q, push_l, push_r, y, f, h)
             work[Work.STEPS] += 1
@@ -246,15 +233,15 @@ def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out:
                 row = deliver(rule == PAPER and theta <= 1.0, y, f, z, g, t, reached, grid, out, row)
             idle = 0 if reached - t > SLIVER * step else idle + 1
             if idle > MAX_IDLE:
-                return STALLED, row, found
+                return Outcome.STALLED, row, found
             y, t = z, reached
             if theta <= 1.0:
                 if found == events.shape[0]:
-                    return EVENTS_FULL, row, found
+                    return Outcome.EVENTS_FULL, row, found
                 note(events, found, t, side, kind_of(mode[side], after), y)
                 found += 1
                 mode[side], changed[side] = after, t
                 free[side] = rule == LOCATED
         if not math.isfinite(y[0] + y[1] + y[2] + y[3] + y[4] + y[5]):
-            return NOT_FINITE, row, found
-    return DONE, row, found
+            return Outcome.NOT_FINITE, row, found
+    return Outcome.DONE, row, found

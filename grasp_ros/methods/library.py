@@ -16,19 +16,8 @@ from grasp_ros.exact.compilation.jit import allocating
 from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.contract import Problem, Solution
-from grasp_ros.methods.equations import (
-    CLAMPED,
-    CONTACT,
-    MAX_IDLE,
-    OPEN,
-    Work,
-    condition,
-    kind_of,
-    parameters,
-    rates,
-    relative,
-)
-from grasp_ros.physics.layout import LEFT, RIGHT, Law
+from grasp_ros.methods.equations import MAX_IDLE, Work, condition, kind_of, parameters, rates, relative
+from grasp_ros.physics.layout import LEFT, RIGHT, Law, Pair
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import PAIR_COLUMNS
 
@@ -74,13 +63,13 @@ def solve(name: str, located: bool, problem: Problem) -> Solution:
     q, work = parameters(problem.system), np.zeros(len(Work), dtype=np.int64)
     grid, place = np.unique(problem.grid, return_inverse=True)  # scipy refuses a time that comes twice
     t, y, row, idle, states = 0.0, problem.system.state, 0, 0, [np.empty((0, 6))]
-    mode = [int(condition(q, tuple(y), side)) if located else CONTACT for side in SIDES]
+    mode = [condition(q, tuple(y), side) if located else Pair.CONTACT for side in SIDES]
     gaps = [_gaps(side, problem.system.pairs[side, Law.DISSIPATION], work) for side in SIDES if located]
     events: list[tuple[float, ...]] = []
     status: Status | None = None
     while status is None:
         active = [gap for side, own in enumerate(gaps) for gap in own[mode[side]]]
-        args = (q, mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT)
+        args = (q, mode[LEFT] == Pair.CONTACT, mode[RIGHT] == Pair.CONTACT)
         try:
             result = _integrate(name, (t, problem.duration), y, grid[row:], args, problem, active or None, work)
         except ValueError:  # of its search for an event: its interpolation has no zero where its steps have one
@@ -101,7 +90,7 @@ def solve(name: str, located: bool, problem: Problem) -> Solution:
         for gap in fired:
             events.append((t, gap.side, kind_of(mode[gap.side], gap.after), *relative(y, gap.side)))
             mode[gap.side] = gap.after
-        f = slopes(t, y, q, mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT)
+        f = slopes(t, y, q, mode[LEFT] == Pair.CONTACT, mode[RIGHT] == Pair.CONTACT)
         for following in (following for gap in fired for following in gaps[gap.side][gap.after]):
             following.begin = t if following.rate(f) < 0.0 else math.nan
         status = Status.EVENT_BUDGET if len(events) > problem.max_events else None
@@ -115,7 +104,7 @@ class _Gap:
 
     terminal = True
 
-    def __init__(self, side: int, after: int, direction: float, p: float | None, work: Any) -> None:
+    def __init__(self, side: int, after: Pair, direction: float, p: float | None, work: Any) -> None:
         self.side, self.after, self.direction, self._work = side, after, direction, work
         self._front, self._back = (column + (p is not None) for column in PAIR_COLUMNS[side])
         self._offset = 0.0 if p is None else 1.0 / p
@@ -144,10 +133,11 @@ class _Gap:
 
 def _gaps(side: int, p: float, work: Any) -> dict[int, list[_Gap]]:
     """The events that can end each mode of a pair."""
-    release = _Gap(side, OPEN, -1.0, None, work)
-    faster = [_Gap(side, CLAMPED, -1.0, p, work)] if p > 0.0 else []
-    slower = [_Gap(side, CONTACT, 1.0, p, work)] if p > 0.0 else []
-    return {OPEN: [_Gap(side, CONTACT, 1.0, None, work)], CONTACT: [release, *faster], CLAMPED: [release, *slower]}
+    release = _Gap(side, Pair.OPEN, -1.0, None, work)
+    faster = [_Gap(side, Pair.CLAMPED, -1.0, p, work)] if p > 0.0 else []
+    slower = [_Gap(side, Pair.CONTACT, 1.0, p, work)] if p > 0.0 else []
+    touch = _Gap(side, Pair.CONTACT, 1.0, None, work)
+    return {Pair.OPEN: [touch], Pair.CONTACT: [release, *faster], Pair.CLAMPED: [release, *slower]}
 
 
 def _integrate(

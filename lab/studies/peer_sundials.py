@@ -13,8 +13,8 @@ import numpy as np
 
 from grasp_ros.accuracy.measure import Answer, Contender, Solve
 from grasp_ros.exact.compilation.jit import kernel
-from grasp_ros.methods.equations import CONTACT, condition, parameters, rates
-from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.methods.equations import condition, parameters, rates
+from grasp_ros.physics.layout import LEFT, RIGHT, Pair
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from lab.studies.peers import other_side_touches
@@ -82,7 +82,7 @@ def _restarted(formula: str, scene: Scene, tolerance: float) -> Solve:
 
     def solve(grid: Array) -> Answer:
         y, t, row, rhs, touches = scene.initial_state, 0.0, 0, 0, [0, 0]
-        mode = [condition(q, tuple(y), side) == CONTACT for side in (LEFT, RIGHT)]
+        mode = [condition(q, tuple(y), side) == Pair.CONTACT for side in (LEFT, RIGHT)]
         out = np.empty((len(grid), 6))
         for _ in range(MAX_RESTARTS):
             while row < len(grid) and grid[row] <= t:
