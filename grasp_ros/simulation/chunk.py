@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -74,28 +73,6 @@ class Setup(NamedTuple):
     max_work: int = MAX_WORK
 
 
-@dataclass
-class Block:
-    """Systems of n rows as arrays, see `physics.system.System`."""
-
-    bodies: Array  # (n, 3, 4)
-    pairs: Array  # (n, 2, 2)
-    state: Array  # (n, 6, 1)
-    coulomb: Array  # (n, 1, 1)
-    laws: Array  # (n, 2, k), see `physics.control.Column`
-
-    @cached_property
-    @np.errstate(all="ignore")  # a row that is refused may hold any number
-    def closed_loop(self) -> Array:
-        """`bodies` with the continuous feedback in them, as `System.closed_loop` has it."""
-        bodies = self.bodies.copy()
-        gains, offset = self.laws[..., : Column.SET_POINT], self.laws[..., Column.SET_POINT]
-        bodies[:, : OBJECT, Of.STIFFNESS] += gains[..., Column.POSITION_GAIN]
-        bodies[:, : OBJECT, Of.DAMPING] += gains[..., Column.VELOCITY_GAIN]
-        bodies[:, : OBJECT, Of.FORCE] += gains[..., Column.POSITION_GAIN] * offset + self.laws[..., Column.FEED_FORWARD]
-        return bodies
-
-
 class Variants:
     """Rows of a scene: changes of its numbers by "section.key", arrays (n,) of one length."""
 
@@ -128,11 +105,10 @@ class Variants:
         if self.is_plain:  # outside a range, with a negative sum of an arm's own number and its feedback's, or outside
             for name, column in self.changes.items():
                 uncertain |= ~self._parameters[name].holds(column)
-            block = self.block
-            uncertain |= (block.closed_loop[:, : OBJECT, Of.STIFFNESS : Of.FORCE] < 0.0).any(axis=(1, 2))
+            block, bodies = self.block, self.closed_loop
+            uncertain |= (bodies[:, : OBJECT, Of.STIFFNESS : Of.FORCE] < 0.0).any(axis=(1, 2))
             with np.errstate(all="ignore"):  # an uncertain row may hold any number
-                rows = Systems(block.closed_loop, block.pairs, block.state[..., 0], self.scene.duration)
-                uncertain |= outside_rows(rows)
+                uncertain |= outside_rows(Systems(bodies, block["pairs"], block["state"][..., 0], self.scene.duration))
         found = {}
         for i in np.flatnonzero(uncertain).tolist():
             try:
@@ -142,16 +118,30 @@ class Variants:
         return found
 
     @cached_property
-    def block(self) -> Block:
-        """The rows as arrays, where `is_plain`."""
-        system, n = self.scene.system, self.rows
-        block = Block(*(np.repeat(array[None], n, axis=0) for array in (
-            system.bodies, system.pairs, system.state[:, None], np.full((1, 1), system.coulomb), system.law_rows,
-        )))
+    def block(self) -> dict[str, Array]:
+        """The rows as arrays, where `is_plain`, by their names in a `System`.
+
+        Bodies (n, 3, 4), pairs (n, 2, 2), state (n, 6, 1), coulomb (n, 1, 1), laws (n, 2, k), see `control.Column`.
+        """
+        system = self.scene.system
+        block = {name: np.repeat(array[None], self.rows, axis=0) for name, array in (
+            ("bodies", system.bodies), ("pairs", system.pairs), ("state", system.state[:, None]),
+            ("coulomb", np.full((1, 1), system.coulomb)), ("laws", system.law_rows))}
         for name, column in self.changes.items():
             array, row, place = PLACES[name]
-            getattr(block, array)[:, row, place] = column
+            block[array][:, row, place] = column
         return block
+
+    @cached_property
+    @np.errstate(all="ignore")  # a row that is refused may hold any number
+    def closed_loop(self) -> Array:
+        """The bodies with the continuous feedback in them, (n, 3, 4), as `System.closed_loop` has it."""
+        bodies, laws = self.block["bodies"].copy(), self.block["laws"]
+        arms, gain = bodies[:, :OBJECT], laws[..., Column.POSITION_GAIN]
+        arms[..., Of.STIFFNESS] += gain
+        arms[..., Of.DAMPING] += laws[..., Column.VELOCITY_GAIN]
+        arms[..., Of.FORCE] += gain * laws[..., Column.SET_POINT] + laws[..., Column.FEED_FORWARD]
+        return bodies
 
 
 class Chunk(NamedTuple):
@@ -219,8 +209,8 @@ def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, whi
     """Integrate rows in one call; returns those that are left to `_run`, because they do not just reach the end."""
     block, n = variants.block, len(which)
     loop, own, gains, pairs, coulomb, state = map(np.ascontiguousarray, (
-        block.closed_loop[which], block.bodies[which], block.laws[which][..., : Column.SET_POINT], block.pairs[which],
-        block.coulomb[which, 0, 0], block.state[which, :, 0]))
+        variants.closed_loop[which], block["bodies"][which], block["laws"][which][..., : Column.SET_POINT],
+        block["pairs"][which], block["coulomb"][which, 0, 0], block["state"][which, :, 0]))
     rows = Rows(loop, own, gains, pairs, coulomb, state, np.full((n, SEEN), np.nan), np.zeros((n, 2)),
                 np.full(n, LEFT_OUT))
     limits = Limits(setup.accuracy, setup.max_events, setup.max_work, stop, setup.settled, setup.horizons)

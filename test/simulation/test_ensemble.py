@@ -115,11 +115,11 @@ def test_arrays_are_built_and_refused_like_scenes() -> None:
                 assert faults[i] == str(refusal.value)
                 continue
             system = variants.row(i).system
-            np.testing.assert_array_equal(block.closed_loop[i], system.closed_loop)
-            np.testing.assert_array_equal(block.bodies[i], system.bodies)
-            np.testing.assert_array_equal(block.pairs[i], system.pairs)
-            np.testing.assert_array_equal(block.state[i, :, 0], system.state)
-            assert block.coulomb[i, 0, 0] == system.coulomb
+            np.testing.assert_array_equal(variants.closed_loop[i], system.closed_loop)
+            np.testing.assert_array_equal(block["bodies"][i], system.bodies)
+            np.testing.assert_array_equal(block["pairs"][i], system.pairs)
+            np.testing.assert_array_equal(block["state"][i, :, 0], system.state)
+            assert block["coulomb"][i, 0, 0] == system.coulomb
 
 
 def test_what_cannot_be_varied_is_refused() -> None:
