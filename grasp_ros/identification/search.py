@@ -195,8 +195,13 @@ def motion(data: Measured, scene: Scene, keys: Sequence[str], rows: int) -> tupl
     A touch is its time in s and its side. Recorded inputs act as they were; without them the controllers of the scene.
     A run that does not get there is refused.
     """
-    times, recorded = data.t[:rows], data.inputs is not None
-    scene = _plant(scene) if recorded else _until(scene, times)
+    times = data.t[:rows]
+    if data.inputs is None:  # up to the first tick behind the last of these times
+        if (ticks := int(tick_of(scene, times[-1:])[0]) + 1) < scene.ticks:
+            scene = scene.changed({"time.duration_s": scene.time_of(ticks)})
+    else:  # all that acts from outside is known: of the scene bodies and contacts are left
+        kept = [section for section in scene.values if not acts(section) and section != "loop"]
+        scene = compose(scene.name, {section: scene.values[section] for section in kept})
     integrator = Integrator(scene.system, continuous=not data.sampled, max_work=WORK + WORK_OF_TICK * scene.ticks)
     carrier = Carrier(scene, integrator, directions(scene, keys, data.sampled), times, data.sampled)
     if data.inputs is None:
@@ -209,16 +214,3 @@ def motion(data: Measured, scene: Scene, keys: Sequence[str], rows: int) -> tupl
     carrier.finish()
     events = integrator.event_table
     return states, carrier.out, events[events[:, Entry.KIND] == Transition.TOUCH][:, [Entry.TIME, Entry.BODY]]
-
-
-def _until(scene: Scene, times: Array) -> Scene:
-    """A scene that ends at the first tick behind the last of some times, if not before."""
-    ticks = int(tick_of(scene, times[-1:])[0]) + 1
-    return scene.changed({"time.duration_s": scene.time_of(ticks)}) if ticks < scene.ticks else scene
-
-
-def _plant(scene: Scene) -> Scene:
-    """What is left of a scene where all that acts from outside is known: bodies and contacts."""
-    return compose(scene.name, {
-        section: numbers for section, numbers in scene.values.items() if not acts(section) and section != "loop"
-    })

@@ -78,12 +78,6 @@ class DesignProblem:
         self.setup, _ = check(scene, setup, self.names)
         self.axes = Plan(scene, self.setup, tuple(axes), sample=1).axes
 
-    def why_unsettled(self) -> str:
-        """Why no run is known to settle, where that is asked for."""
-        if not wanted_by(column for columns in self._columns.values() for column in columns) & Wanted.SETTLING:
-            return ""
-        return f"; {self.scene.why_unsettled(self.setup.sampled)}; last_outside needs no proof"
-
     def numbers(self, parts: Array) -> dict[str, Array]:
         """Free numbers (n,) by their keys, at parts (n, k) of the ranges in [0, 1]."""
         return {key: axis.at(parts[:, i]) for i, axis in enumerate(self.axes) for key in axis.keys}
@@ -219,7 +213,9 @@ def search(problem: DesignProblem, seed: int = 0, progress: Told | None = None) 
         nearest = problem.found(problem.numbers(place[None]))
         shown = ", ".join(f"{name} {values[0]:.6g}" for name, values in nearest.outcomes.items())
         finite = all(np.isfinite(values[0]) for values in nearest.outcomes.values())
-        why = f"; the nearest has {shown}" if finite else problem.why_unsettled()
+        why = f"; the nearest has {shown}" if finite else ""
+        if not finite and wanted_by(find(problem.names)) & Wanted.SETTLING:
+            why = f"; {problem.scene.why_unsettled(problem.setup.sampled)}; last_outside needs no proof"
         raise Refused(f"{problem.scene.name}: none of {runs} choices has a finite {problem.minimise[0]}"
                       + (f" with {wish}" if wish else "") + (f"; {nearest.stops[0]}" if nearest.stops else why))
     if worst - least <= AGREE * abs(least):

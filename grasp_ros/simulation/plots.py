@@ -191,11 +191,7 @@ def energies(axes: Axes, motion: Motion) -> None:
     axes.plot(motion.t, level.V_c, color="black", linewidth=1.2, label="V_c" if known else f"V_c of {PLANT_ALONE}")
     if known and not np.array_equal(level.V, level.V_c, equal_nan=True):
         axes.plot(motion.t, level.V, color=V_COLOR, linewidth=1.0, linestyle="--", label="V of the paper")
-    _scale_energies(axes)
-
-
-def _scale_energies(axes: Axes) -> None:
-    """A scale for all motions that share an axis: logarithmic where V_c falls far and stays above 0."""
+    # One scale for all motions that share the axis: logarithmic where V_c falls far and stays above 0.
     lines = [line for own in axes.get_shared_y_axes().get_siblings(axes) for line in own.get_lines()]
     levels = np.concatenate([line.get_ydata() for line in lines if str(line.get_label()).startswith("V_c")])
     low, high = levels.min(), levels.max()

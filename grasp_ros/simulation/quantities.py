@@ -7,7 +7,7 @@ its horizon until that is decided. What V_c does not prove within HORIZONS horiz
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -84,13 +84,6 @@ def settled_of(run: Trajectory, row: Mapping[str, float] | None) -> Array:
     return last_outside(run.t, run.state[:, 0::2], distance) if (ahead <= distance).all() else np.full(3, np.inf)
 
 
-def last_outside_of(run: Trajectory, row: Mapping[str, float] | None) -> Array:
-    """Last time within a run at which each mass is outside the bound, (3,) in s; without a row by its output times."""
-    if row is not None:  # 0 for a mass that is not there
-        return np.nan_to_num([row[f"last_outside_{NAMES[body]}"] for body in COLUMN], posinf=np.inf)
-    return last_outside(run.t, run.state[:, 0::2], settled_distance(run.scene))
-
-
 def may_rise(run: Trajectory) -> bool:
     """Whether V_c may rise, so that it proves nothing of what follows."""
     return bool(run.controllers or run.scene.caveats(run.sampled))
@@ -157,7 +150,8 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
         found["settled_s"] = _by_body(run, settled)
         found["settled_within_s"] = float(run.t[-1]) if row is None else HORIZONS * scene.duration
     if may_rise(run) and distance > 0.0 and not (row is None and dense is None):
-        found["last_outside_s"] = _by_body(run, last_outside_of(known, row))
+        found["last_outside_s"] = _by_body(run, last_outside(known.t, known.state[:, 0::2], distance) if row is None
+                                           else [row[f"last_outside_{NAMES[body]}"] for body in COLUMN])
     if row is None:
         found["largest_of"] = OUTPUTS if dense is None else TICKS
         acted = np.fmax.reduce(np.abs(known.inputs[:, [LEFT, RIGHT]]), initial=0.0)  # nan: nothing acts from the end on
@@ -173,5 +167,5 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
     return found
 
 
-def _by_body(run: Trajectory, times: Array) -> dict[str, float]:
+def _by_body(run: Trajectory, times: Array | Sequence[float]) -> dict[str, float]:
     return {NAMES[body]: float(times[COLUMN[body] // 2]) for body in run.scene.system.present}
