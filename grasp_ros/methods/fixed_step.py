@@ -29,7 +29,7 @@ from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.equations import MAX_IDLE, SLIVER, Work, condition, kind_of, parameters, rates, relative
-from grasp_ros.physics.layout import EPS, LEFT, RIGHT, Body, Outcome, Pair, Transition
+from grasp_ros.physics.layout import EPS, LEFT, RIGHT, Body, Outcome, Pair
 
 PLAIN, PAPER, LOCATED = 0, 1, 2
 MOST_EVENTS = 10**6  # rows of memory, which is only taken where it is written
@@ -63,11 +63,13 @@ def hermite(y: Any, f: Any, z: Any, g: Any, h: float, theta: float) -> Any:
 
 
 @kernel
-def note(events: Any, count: int, time: float, side: Body, kind: Transition, y: Any) -> None:
-    """Write one row of the record of events."""
+def change(events: Any, count: int, time: float, side: Body, mode: Any, after: Pair, y: Any) -> int:
+    """Give a pair its next mode, and write it into the record of events; returns how many these are then."""
     u, d = relative(y, side)
-    events[count, 0], events[count, 1], events[count, 2] = time, side.value, kind.value
+    events[count, 0], events[count, 1], events[count, 2] = time, side.value, kind_of(mode[side], after).value
     events[count, 3], events[count, 4] = u, d
+    mode[side] = after
+    return count + 1
 
 
 @kernel
@@ -176,24 +178,6 @@ def deliver(linear: bool, y: Any, f: Any, z: Any, g: Any, t: float, reached: flo
     return row
 
 
-@kernel
-def renew_modes(q: Any, y: Any, t: float, mode: Any, changed: Any, events: Any, found: int) -> int:
-    """Evaluate (10) at the beginning of a step of the paper's method; returns the number of events, -1 if full.
-
-    A pair that changes exactly here has u at a rounding error of either sign, and keeps its mode.
-    """
-    for side in (LEFT, RIGHT):
-        now = condition(q, y, side)
-        if now == mode[side] or changed[side] == t:
-            continue
-        if found == events.shape[0]:
-            return -1
-        note(events, found, t, side, kind_of(mode[side], now), y)
-        found += 1
-        mode[side] = now
-    return found
-
-
 @allocating
 def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out: Any, events: Any, work: Any) -> Any:
     """All steps; returns the outcome and how many rows of `out` and of `events` are filled."""
@@ -211,10 +195,12 @@ def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out:
         if duration - end < SLIVER * step:
             end = duration
         free[:] = rule != PLAIN
-        if rule == PAPER:
-            found = renew_modes(q, y, t, mode, changed, events, found)
-            if found < 0:
-                return Outcome.EVENTS_FULL, row, events.shape[0]
+        for side in (LEFT, RIGHT):  # the paper's method evaluates (10) here
+            after = condition(q, y, side) if rule == PAPER else mode[side]
+            if after != mode[side] and changed[side] != t:  # one that changes here has u at a rounding of either sign
+                if found == events.shape[0]:
+                    return Outcome.EVENTS_FULL, row, found
+                found = change(events, found, t, side, mode, after, y)
         while t < end:
             h = end - t
             push_l, push_r = mode[LEFT] == Pair.CONTACT, mode[RIGHT] == Pair.CONTACT
@@ -238,10 +224,8 @@ def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out:
             if theta <= 1.0:
                 if found == events.shape[0]:
                     return Outcome.EVENTS_FULL, row, found
-                note(events, found, t, side, kind_of(mode[side], after), y)
-                found += 1
-                mode[side], changed[side] = after, t
-                free[side] = rule == LOCATED
+                found = change(events, found, t, side, mode, after, y)
+                changed[side], free[side] = t, rule == LOCATED
         if not math.isfinite(y[0] + y[1] + y[2] + y[3] + y[4] + y[5]):
             return Outcome.NOT_FINITE, row, found
     return Outcome.DONE, row, found
