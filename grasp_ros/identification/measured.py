@@ -90,13 +90,13 @@ def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> M
     elif scene is None:
         raise Refused(f"{name}: a table does not name its scene; allowed: with a scene given")
     else:
-        return _checked(_of_table(path, scene))
-    if scene is None:
-        return _checked(found)
-    if found.inputs is not None and scene.period_ns != found.scene.period_ns:
-        raise Refused(f"{found.name}: its inputs change every {found.scene.time_of(1):g} s; allowed: a scene with that"
-                      f" time.control_period_s, not {scene.time_of(1):g}")
-    return _checked(found._replace(scene=scene, sampled=found.sampled or scene.sampled))
+        found = _of_table(path, scene)
+    if scene is not None:
+        if found.inputs is not None and scene.period_ns != found.scene.period_ns:
+            raise Refused(f"{found.name}: its inputs change every {found.scene.time_of(1):g} s; allowed: a scene with"
+                          f" that time.control_period_s, not {scene.time_of(1):g}")
+        found = found._replace(scene=scene, sampled=found.sampled or scene.sampled)
+    return _checked(found)
 
 
 def _of_recording(recording: Recording, by_sensors: bool) -> Measured:
