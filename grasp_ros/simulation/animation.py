@@ -16,7 +16,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.files import format_of, replaced
 from grasp_ros.simulation import canvas
-from grasp_ros.simulation.canvas import Axes, Figure
+from grasp_ros.simulation.canvas import Figure
 from grasp_ros.simulation.plots import COLORS, MM, shown
 from grasp_ros.simulation.tables import Motion
 
@@ -72,7 +72,17 @@ def _stage(motion: Motion, times: Array, width_mm: float) -> tuple[Figure, Any]:
                                            height_ratios=(2, 3))
     low, high = (float(pick(list(positions.values()))) for pick in (np.min, np.max))
     reach = max(high - low, 1e-12)
-    bodies, coils = _draw_line(line, list(positions), low - 0.25 * reach, high + 0.25 * reach, THICK * reach)
+    line.set(xlim=(low - 0.25 * reach, high + 0.25 * reach), ylim=(-1.0, 1.0), xticks=[], yticks=[])
+    for border in ("left", "right", "top"):
+        line.spines[border].set_visible(False)
+    bodies: dict[int, Rectangle] = {}
+    coils: dict[int, Any] = {}
+    for body in positions:  # they are put in their place later
+        height = 1.2 if body == OBJECT else 0.8
+        bodies[body] = Rectangle((0.0, -height / 2.0), THICK * reach, height, facecolor=COLORS[body], edgecolor="black")
+        line.add_patch(bodies[body])
+        if body != OBJECT:
+            (coils[body],) = line.plot(np.zeros(len(COILS)), 0.25 * COILS, color=COLORS[body], linewidth=0.9)
     line.set_title(motion.scene.title, fontsize="small", parse_math=False)
     for body, x in positions.items():
         past.plot(times, x, color=COLORS[body], linewidth=1.0)
@@ -96,20 +106,3 @@ def _stage(motion: Motion, times: Array, width_mm: float) -> tuple[Figure, Any]:
     figure.canvas.draw()
     figure.set_layout_engine("none")  # it has its layout, which takes longer than a picture
     return figure, update
-
-
-def _draw_line(axes: Axes, present: Sequence[int], low: float, high: float, thick: float
-               ) -> tuple[dict[int, Rectangle], dict[int, Any]]:
-    """Bodies and springs on their line; they are put in their place later."""
-    axes.set(xlim=(low, high), ylim=(-1.0, 1.0), xticks=[], yticks=[])
-    for side in ("left", "right", "top"):
-        axes.spines[side].set_visible(False)
-    bodies: dict[int, Rectangle] = {}
-    coils: dict[int, Any] = {}
-    for body in present:
-        height = 1.2 if body == OBJECT else 0.8
-        bodies[body] = Rectangle((0.0, -height / 2.0), thick, height, facecolor=COLORS[body], edgecolor="black")
-        axes.add_patch(bodies[body])
-        if body != OBJECT:
-            (coils[body],) = axes.plot(np.zeros(len(COILS)), 0.25 * COILS, color=COLORS[body], linewidth=0.9)
-    return bodies, coils

@@ -77,10 +77,8 @@ def contact_table(run: Trajectory, side: Body) -> np.ndarray:
     within = (group >= 0) & (ends <= found[group, 1])
     pieces = expand(run.at, _quantities_of(run.scene.system, side), begins[within], ends[within], group[within],
                     MOST_HALVINGS)  # an impact of microseconds may begin a contact of minutes
-    for name, column in (("impulse", 0), ("loss", 1)):
-        rows[name] = pieces.integral(column, len(found))
-    for name, column in (("peak_force", 0), ("deepest", 2)):
-        rows[name] = pieces.largest(column, len(found))
+    rows["impulse"], rows["loss"] = (pieces.integral(column, len(found)) for column in (0, 1))
+    rows["peak_force"], rows["deepest"] = (pieces.largest(column, len(found)) for column in (0, 2))
     return rows
 
 
