@@ -11,7 +11,6 @@ from grasp_ros.cli.checks import check_output, load_scene, prepare, warn
 from grasp_ros.cli.output import figure_endings, show, write_figure, write_scene
 from grasp_ros.identification.fit import fit
 from grasp_ros.identification.measured import CHANNELS, measured
-from grasp_ros.identification.result import Fit
 from grasp_ros.physics.errors import Refused, printable
 from grasp_ros.physics.given import read_number
 from grasp_ros.scene.files import YAML
@@ -56,19 +55,7 @@ def _fit(options: argparse.Namespace) -> int:
             raise Refused(f"--against {text}: allowed: KEY=VALUE, with a number") from None
     prepare()
     found = fit(options.source, options.free, scene, against=against, by_sensors=options.by_sensors)
-    show(options, printable(str(found)), _data(found))
-    if options.output is not None and options.output.suffix.lower() in YAML:
-        write_scene(found.scene, options.output)
-    elif options.output is not None:
-        from grasp_ros.identification.figure import measured_and_fitted
-
-        write_figure(measured_and_fitted(found), options.output)
-    return 1 if found.not_identifiable or found.missed else 0
-
-
-def _data(found: Fit) -> dict[str, Any]:
-    """The same as data; the scene with the estimates as YAML."""
-    return {
+    show(options, printable(str(found)), {
         "source": found.source, "acting": found.acting, "samples": len(found.t), "scene": found.scene.to_yaml(),
         "numbers": {key: {"estimate": value, "low": low, "high": high} for key, value, low, high
                     in zip(found.keys, found.estimates, found.low, found.high, strict=True)},
@@ -77,4 +64,11 @@ def _data(found: Fit) -> dict[str, Any]:
         "contacts": [contact._asdict() for contact in found.contacts],
         "missed": found.missed,
         "against": {key: {**test._asdict(), "rejected": test.rejected} for key, test in found.against.items()},
-    }
+    })
+    if options.output is not None and options.output.suffix.lower() in YAML:
+        write_scene(found.scene, options.output)
+    elif options.output is not None:
+        from grasp_ros.identification.figure import measured_and_fitted
+
+        write_figure(measured_and_fitted(found), options.output)
+    return 1 if found.not_identifiable or found.missed else 0

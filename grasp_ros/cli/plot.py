@@ -100,18 +100,13 @@ def _motion(source: str, options: argparse.Namespace, span: Span) -> Motion:
                      or options.sensitivity):
         raise Refused(f"{source}: --set, --sampled, --method, --step, --sensitivity are not allowed; allowed for"
                       " scenes")
-    if not recorded:
-        if path.is_file() and ending not in YAML:
-            raise Refused(f"{source}: no such scene; allowed: a scene, a bag, or a .npz file of `grasp simulate`")
-        return _simulated(source, options, span)
-    motion: Motion = load(path) if ending == ".npz" else read(path)
-    warn(motion.scene)
-    return motion
-
-
-def _simulated(reference: str, options: argparse.Namespace, span: Span) -> Trajectory:
-    """A scene, with output times where it is looked at."""
-    scene = load_scene(reference, options.settings)
+    if recorded:
+        motion: Motion = load(path) if ending == ".npz" else read(path)
+        warn(motion.scene)
+        return motion
+    if path.is_file() and ending not in YAML:
+        raise Refused(f"{source}: no such scene; allowed: a scene, a bag, or a .npz file of `grasp simulate`")
+    scene = load_scene(source, options.settings)
     check_memory(scene, options.sampled)
     prepare()
     grid = None

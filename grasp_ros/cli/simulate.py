@@ -69,7 +69,12 @@ def _simulate(options: argparse.Namespace) -> int:
 
     scene = load_scene(options.scene, options.settings)
     here = os.open(".", os.O_RDONLY)
-    setting, controllers = _setting(options), load_controllers(options.controllers)
+    knob = METHODS[options.method].knob
+    given = {STEP: options.step, TOLERANCE: options.tolerance, ACCURACY_KNOB: options.accuracy}
+    for other, number in given.items():
+        if other != knob and number not in (None, ACCURACY):
+            raise Refused(f"--{other} is not allowed; allowed for {options.method}: --{knob}")
+    controllers = load_controllers(options.controllers)
     sampled = options.sampled or bool(controllers)
     check_memory(scene, sampled, options.grid)
     check_output(options.output, (".npz", ".csv"), options.force, [options.scene])
@@ -77,10 +82,10 @@ def _simulate(options: argparse.Namespace) -> int:
     prepare()
     with bar(scene.duration, "s", scene.name) as progress:
         trajectory = simulate(
-            scene, grid=grid, sampled=sampled, controllers=controllers, method=options.method, setting=setting,
+            scene, grid=grid, sampled=sampled, controllers=controllers, method=options.method, setting=given[knob],
             max_events=options.max_events, max_work=options.max_work,
             sensitivity=options.sensitivity or None,
-            progress=None if METHODS[options.method].knob == STEP else progress,
+            progress=None if knob == STEP else progress,
         )
     os.fchdir(here)  # a law may have called os.chdir
     os.close(here)
@@ -100,13 +105,3 @@ def _grid(scene: Scene, sampled: bool, number: int) -> Array:
     """Equidistant output times (n,) in s; ticks to the bit: a rounding before one the last command still acts."""
     every, rest = divmod(scene.ticks, number - 1)
     return np.linspace(0.0, scene.duration, number) if rest or not (sampled and every) else tick_times(scene)[::every]
-
-
-def _setting(options: argparse.Namespace) -> float | None:
-    """The number that belongs to the method's knob; one that belongs to another knob is refused."""
-    given = {STEP: options.step, TOLERANCE: options.tolerance, ACCURACY_KNOB: options.accuracy}
-    knob = METHODS[options.method].knob
-    for other, number in given.items():
-        if other != knob and number not in (None, ACCURACY):
-            raise Refused(f"--{other} is not allowed; allowed for {options.method}: --{knob}")
-    return None if given[knob] is None else float(given[knob])
