@@ -24,7 +24,6 @@ from grasp_ros.physics.system import PAIR_COLUMNS
 TOGETHER = 1e-13  # m or m/s, or a part of the horizon; a gap below this at the other side's event is an event of both
 AT_END, AT_EVENT = 0, 1  # where scipy says that it stopped; negative: it failed
 IMPLICIT = ("Radau", "LSODA")  # solvers that take a Jacobian
-SIDES = (int(LEFT), int(RIGHT))
 
 
 @allocating
@@ -63,8 +62,8 @@ def solve(name: str, located: bool, problem: Problem) -> Solution:
     q, work = parameters(problem.system), np.zeros(len(Work), dtype=np.int64)
     grid, place = np.unique(problem.grid, return_inverse=True)  # scipy refuses a time that comes twice
     t, y, row, idle, states = 0.0, problem.system.state, 0, 0, [np.empty((0, 6))]
-    mode = [condition(q, tuple(y), side) if located else Pair.CONTACT for side in SIDES]
-    gaps = [_gaps(side, problem.system.pairs[side, Law.DISSIPATION], work) for side in SIDES if located]
+    mode = [condition(q, tuple(y), side) if located else Pair.CONTACT for side in (LEFT, RIGHT)]
+    gaps = [_gaps(side, problem.system.pairs[side, Law.DISSIPATION], work) for side in (LEFT, RIGHT) if located]
     events: list[tuple[float, ...]] = []
     status: Status | None = None
     while status is None:
