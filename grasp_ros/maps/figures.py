@@ -111,9 +111,8 @@ def correlations(data: Any, plan: Plan, values: np.ndarray) -> list[tuple[str, f
     """Rank correlation (Spearman) of an outcome with each number of a sample, the strongest first."""
     from scipy import stats
 
-    finite, found = np.isfinite(values), []
+    finite = np.isfinite(values)
     spread = finite.sum() > 1 and np.ptp(values[finite]) > 0.0
-    for axis in plan.axes:
-        rank = stats.spearmanr(data[axis.name].values[finite], values[finite]).statistic if spread else 0.0
-        found.append((axis.name, float(rank)))
+    found = [(axis.name, float(stats.spearmanr(data[axis.name].values[finite], values[finite]).statistic)
+              if spread else 0.0) for axis in plan.axes]
     return sorted(found, key=lambda entry: -abs(entry[1]))

@@ -177,8 +177,7 @@ def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER, m
     wanted = wanted_by(columns)
     runs = Runs(np.full((n, SEEN), np.nan), np.full((n, 6), np.nan), np.zeros((n, 2)), np.full(n, np.nan))
     status, stops = np.zeros(n, dtype=np.int8), variants.faults()
-    for i in stops:
-        status[i] = STATUSES.index(REFUSED)
+    status[[*stops]] = STATUSES.index(REFUSED)
     left = np.flatnonzero(status == 0)
     plain = COMPILED and variants.is_plain and not has_inputs(variants.scene, setup)  # rows need no interpreter
     if plain and move is drive and LYAPUNOV not in setup.outcomes:

@@ -85,27 +85,31 @@ def compose(
         if not len(instance("motion", motion, Tabular, A_MOTION).t) or motion.t[0] == motion.t[-1]:
             raise Refused("nothing to draw: the motion has fewer than two output times")
     captions = names("captions", captions if captions is not None else [
-        motion.scene.feedback_in_words(_sampled(motion)) for motion in motions])
+        motion.scene.feedback_in_words(getattr(motion, "sampled", True)) for motion in motions])  # a bag has held ones
     if not 0 < len(motions) == len(captions):
         raise Refused(f"captions: {len(captions)} for {len(motions)} motions; allowed: a motion, and one for each")
     usual = WIDTH_MM if len(motions) == 1 else 150.0 * len(motions)
     width = usual if width_mm is None else number("width_mm", width_mm)
     if width_mm is not None and not NARROWEST_MM <= width <= WIDEST_MM:
         raise Refused(f"width_mm: {width!r} is not allowed; allowed: {NARROWEST_MM:g} to {WIDEST_MM:g} mm")
-    small = width / len(motions) < ONE_COLUMN_MM
+    column_mm = width / len(motions)
+    small = column_mm < ONE_COLUMN_MM
+    size = SMALL_LETTERS if small else LETTERS
+    letters = int(0.8 * column_mm / (size * 0.2))  # in a line that does not reach a neighbour's; one is 0.2 mm/pt wide
     asked = PANELS.values() if panels is None else panels
     panels = [panel for panel in asked if any(map(panel.shown, motions))]
     if not panels:
         raise Refused("nothing to draw: no force acts in these panels")
     shares = [panel.share for panel in panels]
     height = (0.6 if small else 0.9) * WIDTH_MM * max(sum(shares), LEAST_SHARE) / SHARE
-    with canvas.style({"font.size": SMALL_LETTERS if small else LETTERS}):
+    with canvas.style({"font.size": size}):
         figure, grid = canvas.subplots(
             len(panels), len(motions), sharex="col", sharey="row", squeeze=False, height_ratios=shares,
             figsize=(width / MM, height / MM),
         )
         for column, (motion, caption) in enumerate(zip(motions, captions, strict=True)):
-            title = _title(motion, caption, width / len(motions), small)
+            title = textwrap.shorten(motion.scene.title, LONGEST_TITLE, placeholder=" ...")
+            title = "\n".join(textwrap.fill(text, letters) for text in (title, caption))
             grid[0, column].set_title(title, fontsize="medium", parse_math=False)  # a $ of a title is a $
             for panel, axes in zip(panels, grid[:, column], strict=True):
                 panel.draw(axes, motion)
@@ -122,11 +126,6 @@ def compose(
         return figure
 
 
-def _sampled(motion: Motion) -> bool:
-    """Whether commands are held, as in every recording."""
-    return getattr(motion, "sampled", True)
-
-
 def end_of(motion: Motion) -> float:
     """The end of its scene in s, or of a recording whose time goes on behind a reset."""
     return float(max(motion.scene.duration, *motion.t[-1:]))
@@ -139,13 +138,6 @@ def shown(motions: Sequence[Motion], span: tuple[float, float] | None) -> tuple[
     longest = max(end_of(instance("motion", motion, Tabular, A_MOTION)) for motion in motions)
     first, last = ascending("span", rows("span", span, 2), longest, strictly=True).tolist()
     return first, last
-
-
-def _title(motion: Motion, caption: str, width_mm: float, small: bool) -> str:
-    """Title and caption, filled so that neighbours do not collide."""
-    letters = int(0.8 * width_mm / ((SMALL_LETTERS if small else LETTERS) * 0.2))  # a letter is about 0.2 mm/pt wide
-    title = textwrap.shorten(motion.scene.title, LONGEST_TITLE, placeholder=" ...")
-    return "\n".join(textwrap.fill(text, letters) for text in (title, caption))
 
 
 def legend_beside(*row: Axes) -> None:
@@ -171,7 +163,7 @@ def driven(motion: Motion) -> list[int]:
 
 def inputs(axes: Axes, motion: Motion) -> None:
     """Forces of controllers and from outside; what is held from tick to tick as steps."""
-    forces, style = motion.inputs, "steps-post" if _sampled(motion) else "default"
+    forces, style = motion.inputs, "steps-post" if getattr(motion, "sampled", True) else "default"
     for body in driven(motion):
         axes.plot(motion.t, forces[:, body], label=f"input_{NAMES[body]}", color=COLORS[body], linewidth=1.0,
                   drawstyle=style)
