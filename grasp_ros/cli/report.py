@@ -128,6 +128,10 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
     none = "unknown: lyapunov missing" if lacks else (
         f"none: at {unknown} of {found['ticks']} ticks the commands are not those of a known law")
     closes = "closes at every tick" if known else f"closes at {balanced} ticks, others are not known"
+    topics: dict[tuple[float, float], list[str]] = {}  # by how many messages they have, and how often
+    for name, numbers in found["topics"].items():
+        rate = 0.0 if np.isnan(numbers["rate_Hz"]) else numbers["rate_Hz"]
+        topics.setdefault((numbers["messages"], rate), []).append(name)
     rows = [
         ("bag", found["bag"]),
         ("size", f"{found['size_bytes'] / 1e6:.3g} MB"),
@@ -136,7 +140,8 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
         ("run", recording.running.words + (f", {resets} resets" if resets else "")),
         *_timing(found),
         ("recorded", recorded_span(recording)),
-        ("messages", _messages(found["topics"])),
+        ("messages", "; ".join(f"{count}{f' at {rate:.4g} Hz' if rate else ''}: {', '.join(names)}"
+                               for (count, rate), names in sorted(topics.items(), reverse=True))),
         ("contacts left, right", f"{left}, {right} seen at the ticks"),
         (f"V{of}", _ends(found["V_J"])), (f"V_c{of}", _ends(found["V_c_J"])),
         ("certificate", recording.scene.certificate_in_words(sampled=True) if recording.closed else none),
@@ -167,16 +172,6 @@ def describe_verification(verification: Verification) -> list[Row]:
     if verification.same is not None:
         rows.append(("same without ROS", "equal, bit for bit" if verification.same else "NOT EQUAL"))
     return rows
-
-
-def _messages(topics: dict[str, dict[str, float]]) -> str:
-    """Topics by how many messages they have."""
-    alike: dict[tuple[float, float], list[str]] = {}
-    for name, numbers in topics.items():
-        rate = numbers["rate_Hz"]
-        alike.setdefault((numbers["messages"], 0.0 if np.isnan(rate) else rate), []).append(name)
-    return "; ".join(f"{count}{f' at {rate:.4g} Hz' if rate else ''}: {', '.join(names)}"
-                     for (count, rate), names in sorted(alike.items(), reverse=True))
 
 
 def _timing(found: dict[str, Any]) -> list[Row]:

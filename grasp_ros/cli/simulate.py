@@ -16,8 +16,6 @@ from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, UNITS
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.model import Array
-from grasp_ros.scene import Scene
 from grasp_ros.simulation import GRID_POINTS, simulate
 from grasp_ros.simulation.sampled_plant import tick_times
 
@@ -78,7 +76,11 @@ def _simulate(options: argparse.Namespace) -> int:
     sampled = options.sampled or bool(controllers)
     check_memory(scene, sampled, options.grid)
     check_output(options.output, (".npz", ".csv"), options.force, [options.scene])
-    grid = None if options.grid is None else _grid(scene, sampled or scene.sampled, options.grid)
+    grid = None
+    if options.grid is not None:  # ticks to the bit: a rounding before one the last command still acts
+        every, rest = divmod(scene.ticks, options.grid - 1)
+        on_ticks = every and not rest and (sampled or scene.sampled)
+        grid = tick_times(scene)[::every] if on_ticks else np.linspace(0.0, scene.duration, options.grid)
     prepare()
     with bar(scene.duration, "s", scene.name) as progress:
         trajectory = simulate(
@@ -99,9 +101,3 @@ def _simulate(options: argparse.Namespace) -> int:
         with destination(options.output) as file:
             (trajectory.save if options.output.suffix.lower() == ".npz" else trajectory.to_csv)(file)
     return 0 if trajectory.status is Status.DONE else 1
-
-
-def _grid(scene: Scene, sampled: bool, number: int) -> Array:
-    """Equidistant output times (n,) in s; ticks to the bit: a rounding before one the last command still acts."""
-    every, rest = divmod(scene.ticks, number - 1)
-    return np.linspace(0.0, scene.duration, number) if rest or not (sampled and every) else tick_times(scene)[::every]
