@@ -98,7 +98,10 @@ def simulate(
         if method != EXACT or controllers or changes:
             raise Refused(f"{scene.name}: sensitivity: allowed: the method {EXACT}, without controllers and changes")
     setting = registry.check(method, scene, setting, sampled=sampled, max_work=max_work)
-    _check_ticks(scene, sampled, max_work)
+    changing = [length_hint(force.changes(scene.ticks)) for force in scene.system.external]
+    ticks, most = scene.ticks if sampled else max(changing, default=0), max(MAX_WORK, max_work)
+    if ticks > most:  # each of them costs a piece of work at least
+        raise Refused(f"{scene.name}: {ticks} control periods with an input each; allowed: max_work, {most}")
     if grid is None:
         grid = tick_times(scene) if sampled else np.linspace(0.0, scene.duration, GRID_POINTS)
     grid = ascending("grid", grid, scene.duration)  # new: kernels are compiled anew for arrays that nobody may write to
@@ -118,13 +121,3 @@ def simulate(
     from grasp_ros.simulation.differentiate import differentiate  # whose kernels no other run loads
 
     return replace(run, sensitivity=differentiate(run, sensitivity))
-
-
-def _check_ticks(scene: Scene, sampled: bool, max_work: int) -> None:
-    """Refuse more control periods, each of which costs a piece of work at least, than the budget lets a run do."""
-    if not (sampled or scene.system.external):
-        return
-    changes = [length_hint(force.changes(scene.ticks)) for force in scene.system.external]
-    ticks, most = scene.ticks if sampled else max(changes, default=0), max(MAX_WORK, max_work)
-    if ticks > most:
-        raise Refused(f"{scene.name}: {ticks} control periods with an input each; allowed: max_work, {most}")
