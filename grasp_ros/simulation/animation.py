@@ -37,19 +37,6 @@ def animate(motion: Motion, path: Path, *, speed: float = 1.0, span: tuple[float
     Between its output times states are interpolated linearly. `speed` is in seconds of the motion in a second, `span`
     its first and last time in s; by default it is the whole motion, 150 mm wide.
     """
-    times = _times(motion, speed, span)
-    ending = format_of(path, FORMATS)
-    with replaced(path) as part, canvas.style():
-        figure, update = _stage(motion, times, WIDTH_MM if width_mm is None else width_mm)
-        animation = FuncAnimation(figure, update, frames=len(times), interval=1e3 / RATE, blit=False)
-        if ending == ".html":
-            part.write_text(animation.to_jshtml(fps=RATE), encoding="utf-8")
-        else:
-            animation.save(part, writer="pillow", fps=RATE, dpi=DPI)
-
-
-def _times(motion: Motion, speed: float, span: tuple[float, float] | None) -> Array:
-    """Times of the pictures."""
     if not len(motion.t):
         raise Refused("nothing to draw: the motion has no output times")
     if not 0.0 < speed < np.inf:
@@ -59,7 +46,15 @@ def _times(motion: Motion, speed: float, span: tuple[float, float] | None) -> Ar
     if count > MOST_PICTURES:
         raise Refused(f"speed: {speed!r} makes {count} pictures; allowed: at most {MOST_PICTURES}, by a higher speed"
                       " or a shorter time")
-    return np.minimum(first + np.arange(count) * speed / RATE, last)
+    times = np.minimum(first + np.arange(count) * speed / RATE, last)
+    ending = format_of(path, FORMATS)
+    with replaced(path) as part, canvas.style():
+        figure, update = _stage(motion, times, WIDTH_MM if width_mm is None else width_mm)
+        animation = FuncAnimation(figure, update, frames=len(times), interval=1e3 / RATE, blit=False)
+        if ending == ".html":
+            part.write_text(animation.to_jshtml(fps=RATE), encoding="utf-8")
+        else:
+            animation.save(part, writer="pillow", fps=RATE, dpi=DPI)
 
 
 def _stage(motion: Motion, times: Array, width_mm: float) -> tuple[Figure, Any]:
