@@ -24,18 +24,17 @@ if TYPE_CHECKING:
     from grasp_ros.simulation.progress import Told
 
 STDOUT = Path("-")
-_LEVEL = {"quiet": False}
+LOG = logging.getLogger("grasp_ros")  # whose level says how much is said beside the results
 
 
 def set_level(options: argparse.Namespace) -> None:
     """How much a command says beside its results."""
-    _LEVEL["quiet"] = bool(getattr(options, "quiet", False))
-    logging.getLogger("grasp_ros").setLevel(logging.ERROR if _LEVEL["quiet"] else logging.WARNING)
+    LOG.setLevel(logging.ERROR if getattr(options, "quiet", False) else logging.WARNING)
 
 
 def note(text: str) -> None:
     """Say something beside the results, unless nobody wants to hear it."""
-    if not _LEVEL["quiet"]:
+    if LOG.isEnabledFor(logging.WARNING):
         print(text, file=sys.stderr)
 
 
@@ -43,7 +42,7 @@ def bar(total: float | None, unit: str, name: str) -> AbstractContextManager[Tol
     """A bar on a terminal, see `simulation.progress`; None where there is none."""
     from grasp_ros.simulation.progress import showing  # with the compiler, which a graph does not need
 
-    return showing(not _LEVEL["quiet"], total, unit, name)
+    return showing(LOG.isEnabledFor(logging.WARNING), total, unit, name)
 
 
 def show(options: argparse.Namespace, text: str, data: Any) -> None:

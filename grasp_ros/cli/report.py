@@ -197,4 +197,3 @@ def _with_words(scene: Scene, rows: list[Row], other: bool) -> list[Row]:
 
 def _ends(values: Array | Sequence[float]) -> str:
     return f"{values[0]:.6g} J, {values[-1]:.6g} J (twice the energy)"
-
