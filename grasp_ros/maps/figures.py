@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.maps.plan import Axis, Plan
-from grasp_ros.scene.parameter import UNITS, ending_of
+from grasp_ros.scene.effects.base import UNITS, ending_of
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Axes, LogNorm, Normalize, colormaps
 from grasp_ros.simulation.plots import save

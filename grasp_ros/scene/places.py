@@ -7,7 +7,7 @@ import os
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.system import Place
 from grasp_ros.scene.effects import EFFECTS
-from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.effects.base import Parameter
 from grasp_ros.scene.scene import Scene
 
 PLACES: dict[str, Place] = {f"{effect.section}.{key}": place for effect in EFFECTS

@@ -22,10 +22,10 @@ from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects import BY_SECTION, build, named
-from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, nanoseconds, period_ns
+from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, Parameter
 from grasp_ros.scene.effects.loop import HELD
+from grasp_ros.scene.effects.time import nanoseconds, period_ns
 from grasp_ros.scene.files import YAML, read_text, reading
-from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.settings import apply, texts_of_changed
 from grasp_ros.scene.strict_yaml import dump
 from grasp_ros.scene.strict_yaml import load as load_yaml

@@ -20,9 +20,8 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import PAIR_COLUMNS, System
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import build
-from grasp_ros.scene.effects.base import SIDES
+from grasp_ros.scene.effects.base import SIDES, Parameter
 from grasp_ros.scene.effects.force import FORCED
-from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.places import parameter_of, place_of
 
 NOT_SMOOTH = {  # by the unit of a number: why no derivative is to be had

@@ -12,7 +12,7 @@ import pytest
 
 from grasp_ros.graph.bag import recorder
 from grasp_ros.physics.errors import Refused
-from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.effects.base import Parameter
 from lab.drills import parser_fuzzing as readers
 
 

@@ -14,7 +14,7 @@ from documents import BASE, document, text_with
 from grasp_ros.physics.domain import SMALLEST
 from grasp_ros.scene import compose, load, parse
 from grasp_ros.scene.effects import BY_SECTION
-from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.effects.base import Parameter
 from grasp_ros.scene.validation import SceneError
 
 EVERY = [(section, parameter) for section in BASE if section in BY_SECTION

@@ -1,24 +1,99 @@
-"""What an effect is: everything that one section of a scene brings, in one record."""
+"""What an effect is: everything that one section of a scene brings, in one record; and what each of its numbers is."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from grasp_ros.physics.domain import SMALLEST
+from grasp_ros.physics.given import plain
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, Place, System
-from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import Topic
 
 Numbers = Mapping[str, Any]  # one section of a scene: its keys and values
 Sections = Mapping[str, Numbers]  # a whole scene
 SIDES = {"left": LEFT, "right": RIGHT}
 NANOSECONDS = 1_000_000_000
+UNITS = {  # endings of keys; the longest that fits counts
+    "_kg": "kg", "_m": "m", "_s": "s", "_N": "N", "_Hz": "Hz", "_rad": "rad", "_m_per_s": "m/s", "_m_per_s2": "m/s^2",
+    "_N_per_m": "N/m", "_Ns_per_m": "N s/m", "_N_per_m1_5": "N/m^1.5", "_s_per_m": "s/m", "_ticks": "control periods",
+    "_seed": "1",
+}
+
+
+@cache
+def ending_of(key: str) -> str:
+    """The ending of a key that says its unit; empty if none does."""
+    return max((ending for ending in UNITS if key.endswith(ending)), key=len, default="")
+
+
+def _short(number: float) -> str:
+    """A bound in few digits, but all that it has."""
+    text = f"{number:g}"
+    return text if float(text) == number else repr(number)
+
+
+class Parameter(NamedTuple):
+    """One number of a scene, or one list of numbers."""
+
+    key: str  # ends with its unit
+    low: float
+    high: float
+    text: str
+    open_low: bool = False  # whether low itself is excluded
+    optional: bool = False  # without it, what it describes is not there
+    live: bool = False  # whether it may be set while the graph runs
+    whole: bool = False
+    several: bool = False
+    smallest: float = SMALLEST  # of what is not 0
+    place: tuple[str, int] | None = None  # array of a system and column, where it goes straight into one
+
+    @property
+    def unit(self) -> str:
+        """The unit of the key's ending."""
+        return UNITS[ending_of(self.key)]
+
+    @property
+    def allowed(self) -> str:
+        """The range in words."""
+        kind = "a whole number" if self.whole else "a number"
+        span = f"{kind} {'>' if self.open_low else '>='} {_short(self.low)} and <= {_short(self.high)}"
+        if self.has_smallest:
+            span += f", of a size >= {self.smallest:g}" + ("" if self.open_low and self.low == 0.0 else " or 0")
+        return f"a list of at least one entry, each {span}" if self.several else span
+
+    @property
+    def has_smallest(self) -> bool:
+        """Whether numbers in the range may come close to 0."""
+        return not self.whole and self.smallest > max(self.low, 0.0)
+
+    def accepts(self, value: Any) -> bool:
+        """Whether a value from a file, or from Python, is of the right kind and in the range; NaN is in no range."""
+        if self.several:
+            row = isinstance(value, (list, tuple)) or (hasattr(value, "__array__") and getattr(value, "ndim", 0) == 1)
+            return row and len(value) > 0 and all(self._accepts_one(plain(entry)) for entry in value)
+        return self._accepts_one(plain(value))
+
+    def read(self, value: Any) -> Any:
+        """An accepted value as float, int or tuple of floats."""
+        if self.several:
+            return tuple(float(entry) for entry in value)
+        return int(value) if self.whole else float(value)
+
+    def holds(self, values: Any) -> Any:
+        """Whether a number, or each of some in an array, is in the range; NaN is in none."""
+        within = (self.low < values if self.open_low else self.low <= values) & (values <= self.high)
+        return within & ((values == 0.0) | (abs(values) >= self.smallest)) if self.has_smallest else within
+
+    def _accepts_one(self, value: int | float | None) -> bool:
+        # 7.0 is whole: messages carry nothing else
+        return value is not None and not (self.whole and value != value // 1) and bool(self.holds(value))
 
 
 class Output(NamedTuple):
@@ -78,13 +153,3 @@ def _place(row: int, array: str, column: int) -> Place:
     if array == "state":
         return array, COLUMN[row] + column, 0
     return array, 0 if array == "coulomb" else int(row), int(column)
-
-
-def nanoseconds(seconds: float) -> int:
-    """A time in ns, rounded."""
-    return round(seconds * NANOSECONDS)
-
-
-def period_ns(sections: Sections) -> int:
-    """Control period of a scene in ns."""
-    return nanoseconds(sections["time"]["control_period_s"])

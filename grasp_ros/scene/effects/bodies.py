@@ -7,8 +7,7 @@ from functools import partial
 
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import OBJECT, Of
-from grasp_ros.scene.effects.base import SIDES, Effect, Sections, nothing, problem
-from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.effects.base import SIDES, Effect, Parameter, Sections, nothing, problem
 
 MASS_KG = Parameter("mass_kg", *RANGES["mass"].bounds, "mass", place=("bodies", Of.MASS))
 MOTION = (

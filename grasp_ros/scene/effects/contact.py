@@ -10,8 +10,7 @@ from grasp_ros.physics.impact_law import stored_energy
 from grasp_ros.physics.layout import LEFT, OBJECT, Law, Of
 from grasp_ros.physics.model import Array, penetration
 from grasp_ros.physics.system import COLUMN, System
-from grasp_ros.scene.effects.base import SIDES, Effect, Output, Sections, nothing, oddity
-from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.effects.base import SIDES, Effect, Output, Parameter, Sections, nothing, oddity
 from grasp_ros.scene.topics import CONTACTS
 
 ROUNDING = 1e-9  # of the largest position, or of 1 m: what is less deep is meant to touch

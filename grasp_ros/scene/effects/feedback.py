@@ -8,8 +8,7 @@ from functools import partial
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import SIDES, Effect, Sections, nothing, oddity
-from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.effects.base import SIDES, Effect, Parameter, Sections, nothing, oddity
 from grasp_ros.scene.topics import COMMANDS
 
 PARAMETERS = (

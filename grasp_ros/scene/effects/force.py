@@ -17,8 +17,8 @@ from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import ExternalForce, System
-from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, Sections, nanoseconds, oddity, period_ns, problem
-from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, Parameter, Sections, oddity, problem
+from grasp_ros.scene.effects.time import nanoseconds, period_ns
 from grasp_ros.scene.topics import EXTERNAL_FORCES
 
 SECTIONS = {"left_arm": LEFT, "object": OBJECT, "right_arm": RIGHT}

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import OBJECT, Of
-from grasp_ros.scene.effects.base import Effect, nothing
-from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.effects.base import Effect, Parameter, nothing
 
 EFFECTS = (
     Effect(

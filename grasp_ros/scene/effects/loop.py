@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.sampled import spectral_radius
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import SIDES, Effect, Sections, nanoseconds, oddity, period_ns
-from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.effects.base import SIDES, Effect, Parameter, Sections, oddity
+from grasp_ros.scene.effects.time import nanoseconds, period_ns
 
 HELD = "commands are held over control periods and do work of their own"
 FAR = 6.0  # decades that a motion may grow in a run: studies of the limit of stability need fewer

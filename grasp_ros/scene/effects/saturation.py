@@ -8,8 +8,7 @@ from functools import partial
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import SIDES, Effect, Sections, oddity
-from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.effects.base import SIDES, Effect, Parameter, Sections, oddity
 
 PARAMETERS = (
     Parameter("limit_N", 0.0, RANGES["force"].high, "largest force of the actuator in both directions", live=True),

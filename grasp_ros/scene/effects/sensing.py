@@ -7,8 +7,7 @@ from functools import partial
 
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import SIDES, Effect, Sections, oddity
-from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.effects.base import SIDES, Effect, Parameter, Sections, oddity
 
 PARAMETERS = (
     Parameter("noise_seed", 0, 2**31 - 1, "seed of the noise", whole=True),

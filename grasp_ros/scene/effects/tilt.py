@@ -8,8 +8,7 @@ from collections.abc import Iterable
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import Of
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import Effect, Sections, oddity
-from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.effects.base import Effect, Parameter, Sections, oddity
 
 
 def _build(sections: Sections, system: System) -> None:

@@ -1,12 +1,21 @@
-"""Length of a run and its control period. Every scene has them."""
+"""Length of a run and its control period, which every scene has; times in nanoseconds."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from grasp_ros.physics.domain import RANGES
-from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Sections, nanoseconds, nothing, period_ns, problem
-from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Parameter, Sections, nothing, problem
+
+
+def nanoseconds(seconds: float) -> int:
+    """A time in ns, rounded."""
+    return round(seconds * NANOSECONDS)
+
+
+def period_ns(sections: Sections) -> int:
+    """Control period of a scene in ns."""
+    return nanoseconds(sections["time"]["control_period_s"])
 
 
 def _problems(sections: Sections) -> Iterable[str]:
