@@ -96,11 +96,6 @@ class Systems:
         return np.asarray((self.x[:, OBJECT:] - self.x[:, :OBJECT]) * SIGNS)
 
     @cached_property
-    def elastic(self) -> Array:
-        """Elastic force of the pairs at the start, (n, 2) in N."""
-        return np.asarray(elastic_force(self._pairs[..., Law.HERTZIAN], np.maximum(-self.gap, 0.0)) * self.touching)
-
-    @cached_property
     def pressed(self) -> Array:
         """Constant force of each pair if all bodies with contacts were one rigid body at x_o, (n, 2) in N."""
         push = self._bodies[..., Of.FORCE] - self._bodies[..., Of.STIFFNESS] * self.x[:, OBJECT:]
@@ -131,9 +126,10 @@ class Systems:
         A pair pressed by the force F relaxes at the rate p F / mu, so this counts relaxation times: p F t / mu where F
         presses for a time t, and p v for an impact at v that loses all of v.
         """
-        loss = self._pairs[..., Law.DISSIPATION]
-        outward = np.minimum(self.duration, loss / STORED * np.maximum(-self.gap, 0.0))  # s, separating at 1/p
-        force = self.elastic * outward + self.pressed * self.duration
+        loss, depth = self._pairs[..., Law.DISSIPATION], np.maximum(-self.gap, 0.0)
+        elastic: Array = elastic_force(self._pairs[..., Law.HERTZIAN], depth) * self.touching
+        outward = np.minimum(self.duration, loss / STORED * depth)  # s, separating at 1/p
+        force = elastic * outward + self.pressed * self.duration
         return loss * self.touching * (self.speed[:, :OBJECT] + self.speed[:, OBJECT:] + force / self.reduced)
 
 

@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from grasp_ros.physics import given
 from grasp_ros.physics.body_energy import body_energy
 from grasp_ros.physics.impact_law import stored_energy
-from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Law, Of
-from grasp_ros.physics.model import Array, Contact, Mode, hertzian_force, in_contact, penetration
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, Law, Of
+from grasp_ros.physics.model import Array, Contact, hertzian_force, in_contact, penetration
 from grasp_ros.physics.system import COLUMN, System
 
-FLAGS: dict[int, Mode] = {LEFT: Mode.LEFT, RIGHT: Mode.RIGHT}
 ROUNDING = 1e-12  # part of the energy that the roundings of some hundred steps may add in one control period
 
 PLANT_AND_FEEDBACK, PLANT_ALONE = "plant and feedback", "the plant alone"  # what V and V_c are the energy of
@@ -60,11 +59,18 @@ def energy(system: System, state: Array, external: Array | None = None, *, feedb
     bodies = given.instance("system", system, System, "a System").closed_loop if feedback else system.bodies
     kinetic: Array = np.zeros(np.shape(state)[:-1])
     potential: Array = np.zeros(np.shape(state)[:-1])
+    loss: Array = np.zeros(np.shape(state)[:-1])
     for body in system.present:
         moving, held = mechanical_levels(bodies, body, state)
         kinetic, potential = kinetic + moving, potential + held
+        v = state[..., COLUMN[body] + 1]
+        loss = loss + bodies[body, Of.DAMPING] * v * v
+        if body == OBJECT and system.coulomb > 0.0:
+            loss = loss + system.coulomb * np.abs(v)
+        if external is not None and np.any(push := external[..., body]):
+            loss = loss - push * v
     V = V_c = kinetic + potential
-    V_rate = _power(system, bodies, state, external)
+    V_rate = -2.0 * loss
     mode = np.zeros(np.shape(V), dtype=np.int64)
     for side, u, d in pairs_of(system, state):
         contact = Contact(*system.pairs[side])
@@ -74,7 +80,7 @@ def energy(system: System, state: Array, external: Array | None = None, *, feedb
         V_c = V_c + stored
         V = V + np.where(touching, stored, 0.0)
         V_rate = V_rate + np.where(touching, -2.0 * contact.dissipation * force * d * d, 2.0 * force * d)
-        mode = mode | np.where(touching, int(FLAGS[side]), 0)
+        mode = mode | np.where(touching, 1 << side, 0)
     return Energy(V, V_c, V_rate, mode)
 
 
@@ -152,19 +158,6 @@ def _place(system: System, body: int, state: Array) -> Array:
     """Scale of the rounding of a body's position, m; with the object's for an arm, which may follow from it."""
     place: Array = np.abs(state[..., COLUMN[body]])
     return place + np.abs(state[..., COLUMN[OBJECT]]) if body != OBJECT and OBJECT in system.present else place
-
-
-def _power(system: System, bodies: Array, state: Array, external: Array | None) -> Array:
-    """V' without the contacts."""
-    loss: Array = np.zeros(np.shape(state)[:-1])
-    for body in system.present:
-        v = state[..., COLUMN[body] + 1]
-        loss = loss + bodies[body, Of.DAMPING] * v * v
-        if body == OBJECT and system.coulomb > 0.0:
-            loss = loss + system.coulomb * np.abs(v)
-        if external is not None and np.any(push := external[..., body]):
-            loss = loss - push * v
-    return -2.0 * loss
 
 
 def pairs_of(system: System, state: Array) -> list[tuple[int, Array, Array]]:

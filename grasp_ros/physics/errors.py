@@ -19,20 +19,18 @@ def printable(text: str) -> str:
     return "".join(sign if sign.isprintable() or sign == "\n" else repr(sign)[1:-1] for sign in text)
 
 
-def place_of(error: BaseException) -> str:
-    """Where an exception was raised, if possible not in Python's own library, rclpy or numba: "file, line n"."""
-    places = extract_tb(error.__traceback__)
-    place = next((place for place in reversed(places) if not OTHERS.search(place.filename)), places[-1])
-    return f"{place.filename}, line {place.lineno}"
-
-
 def described(error: BaseException) -> str:
-    """What went wrong in somebody else's code, and where: "ValueError: words, file, line n"."""
+    """What went wrong in somebody else's code, and where: "ValueError: words, file, line n".
+
+    The place is, if possible, not in Python's own library, rclpy or numba.
+    """
     try:
         words = " ".join(str(error).split())
     except Exception:  # its `__str__` is somebody else's, too
         words = "without words"
-    return ": ".join(filter(None, [type(error).__name__, words])) + f", {place_of(error)}"
+    places = extract_tb(error.__traceback__)
+    place = next((place for place in reversed(places) if not OTHERS.search(place.filename)), places[-1])
+    return ": ".join(filter(None, [type(error).__name__, words])) + f", {place.filename}, line {place.lineno}"
 
 
 class Refused(ValueError):  # noqa: N818 - it is what happens to the input, and no error of the package
