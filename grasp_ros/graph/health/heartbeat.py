@@ -13,7 +13,6 @@ import os
 import threading
 import time
 import uuid
-from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
@@ -21,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from rclpy.duration import Duration
+from std_msgs.msg import String
 
-from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode
 from grasp_ros.scene.topics import ALIVE
 
@@ -104,7 +103,7 @@ class Heartbeats:
 
     def _beat(self) -> None:
         self._last = time.monotonic()
-        self.publisher.publish(messages.text(json.dumps(asdict(self.own))))
+        self.publisher.publish(String(data=json.dumps(asdict(self.own))))
 
     def tell(self) -> None:
         """Let all know what has changed, before what is published next."""
@@ -154,17 +153,6 @@ class Heartbeats:
         """Which of these nodes were heard once, but not since a wall time, and had no last words."""
         heard = {beat.node: beat.heard for beat in self.alive}
         return [name for name in dict.fromkeys(names) if heard.get(name, limit) < limit]
-
-    def living(self, names: Sequence[str], limit: float) -> list[str]:
-        """Names of the sources of a topic without processes that were heard once, but not since a wall time.
-
-        DDS lists them for up to LEASE_SECONDS.
-        """
-        found = []
-        for name, number in Counter(names).items():
-            dead = [beat for beat in self.of([name]) if beat.ended or beat.heard < limit]
-            found += [name] * max(1, number - len(dead))
-        return found
 
     def vouched(self, name: str) -> Heartbeat | None:
         """Who says a text, by its digest; None if nobody does."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from abc import abstractmethod
+from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, NamedTuple
@@ -183,8 +184,12 @@ class PeerNode(GraspNode):
         self.trouble = f"waits for {', '.join(self._silent)}" if self._silent else ""
 
     def living(self, topic: Topic) -> list[str]:
-        """Sources of a topic without processes that are known to be dead."""
-        return self.heartbeats.living(self.sources(topic), time.monotonic() - self.patience)
+        """Sources of a topic without processes that are known to be dead: DDS lists these for up to LEASE_SECONDS."""
+        found, limit = [], time.monotonic() - self.patience
+        for name, number in Counter(self.sources(topic)).items():
+            dead = [beat for beat in self.heartbeats.of([name]) if beat.ended or beat.heard < limit]
+            found += [name] * max(1, number - len(dead))
+        return found
 
     def on_text(self, topic: Topic, take: Callable[[str], None]) -> None:
         """Subscribe to a text; accepted if a living node sends its digest, or if no node sends digests."""

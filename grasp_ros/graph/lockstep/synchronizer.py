@@ -8,8 +8,7 @@ from collections.abc import Collection, Sequence
 from enum import Enum
 from typing import NamedTuple
 
-from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.messages import State, StateReader
+from grasp_ros.graph.ros.messages import UNREADABLE, State, StateReader
 from grasp_ros.graph.serialization import MOST_BYTES, force_message, raw_force, raw_stamp_ns
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.topics import COMMANDS, FORCE, JOINT_STATES, WINDOW, Topic
@@ -87,7 +86,7 @@ class Synchronizer:
             if stamp % self._period_ns or not 0 <= stamp <= self.end_ns:
                 return Arrival.STAMP
             return self._put_state(stamp, cdr) if topic == JOINT_STATES else self._put_other(topic, stamp, cdr, sure)
-        except messages.UNREADABLE:
+        except UNREADABLE:
             return Arrival.REFUSED
 
     def _put_state(self, stamp: int, cdr: bytes) -> Arrival:
@@ -97,8 +96,7 @@ class Synchronizer:
             return Arrival.STAMP
         if self._newest < 0:  # what came before it may have had any stamp
             for topic, queue in self._others.items():
-                near = {other: known for other, known in queue.items() if other <= stamp + self._ahead_ns}
-                self._others[topic] = near
+                self._others[topic] = {at: known for at, known in queue.items() if at <= stamp + self._ahead_ns}
         self._states.append((stamp < self._newest, self._reader.read(cdr), cdr))
         self._newest = stamp
         return Arrival.TAKEN
@@ -148,23 +146,16 @@ class Synchronizer:
 
     def _decide(self, topic: Topic, there: Sequence[bytes], time_ns: int, late: bool) -> tuple[bytes | None, bool]:
         """The command that acted, and whether it was made from the effort, as nobody sent it here."""
-        force = self._acted(ARMS[topic], time_ns)
-        if force is None:  # it is still to come, or it was reset before, or no plant may be so far ahead
-            to_come = (len(self._states) <= self._wait < WINDOW
-                       and time_ns + self._wait * self._period_ns <= self.end_ns)
+        told_ns = time_ns + self._wait * self._period_ns  # stamp of the state that has its force
+        if len(self._states) <= self._wait or (later := self._states[self._wait][1]).time_ns != told_ns:
+            # It is still to come, or it was reset before, or no plant may be so far ahead.
+            to_come = len(self._states) <= self._wait < WINDOW and told_ns <= self.end_ns
             return (there[-1] if there and late and not to_come else None), False
+        force = later.inputs[ARMS[topic]]
         for cdr in there:
             if raw_force(cdr) == force:
                 return cdr, False
         return (force_message(time_ns, force), True) if late else (None, False)
-
-    def _acted(self, arm: int, time_ns: int) -> float | None:
-        """The force in N of the command that answers the first state, as a later one has it."""
-        if len(self._states) <= self._wait:
-            return None
-        _, later, _ = self._states[self._wait]
-        known = later.time_ns == time_ns + self._wait * self._period_ns
-        return later.inputs[arm] if known else None
 
     def _forget(self, topic: Topic, time_ns: int) -> int:
         """Let go of what belongs to a tick; returns how many messages came before it and belong to none."""
