@@ -12,7 +12,7 @@ import tty
 from collections.abc import Mapping
 from contextlib import closing, suppress
 from enum import Enum
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -139,15 +139,11 @@ class Key(Enum):
 
 
 class Keys:
-    """Keys pressed on the standard input from `start` to `close`."""
+    """Keys pressed on the standard input until `close`, one by one and not shown; Ctrl-C stays a signal."""
 
     def __init__(self) -> None:
         # Whether there can be any: not without a terminal, nor in the background, where a terminal stops who sets it.
-        self.there, self._file, self._rest = False, 0, b""
-        self._before: list[Any] = []
-
-    def start(self) -> None:
-        """From now on keys come one by one and are not shown; Ctrl-C stays a signal."""
+        self.there, self._rest = False, b""
         self._file = sys.stdin.fileno() if sys.stdin and not sys.stdin.closed else -1
         with suppress(OSError):  # not a terminal, or not that of this session
             if self._file >= 0 and os.tcgetpgrp(self._file) == os.getpgrp():
@@ -193,8 +189,7 @@ def play(recording: Recording, rate: float, first: float | None = None) -> None:
     if not times[0] <= first <= times[-1]:
         raise Refused(f"--from: {first!r} is not allowed; allowed: {times[0]:g} to {times[-1]:g} s")
     row, paused, at, since = 0, False, first, time.monotonic()  # what is shown; since when time goes by, from where
-    with closing(Keys()) as keys, Live(auto_refresh=False) as live:
-        keys.start()
+    with Live(auto_refresh=False) as live, closing(Keys()) as keys:
         view = View(recording.scene, HINT if keys.there else "")
         while True:
             if not paused:

@@ -42,8 +42,7 @@ def find_law(place: str, what: str) -> Law | type:
         raise Refused(f"{what}: {module} has no {name} ({where}); allowed: a callable of it") from None
     if not callable(law):
         raise Refused(f"{what}: {law!r} cannot be called; allowed: {CALLABLE}")
-    found: Law | type = law
-    return found
+    return law  # type: ignore[no-any-return]
 
 
 def begin(law: Law | type, what: str) -> Law:

@@ -123,8 +123,8 @@ node = rclpy.create_node("late")
 case = scene.load("case_01")
 topics = [SCENE, RUN, *case.topics]
 out = {topic: node.create_publisher(messages.TYPES[topic.type], topic.name, messages.qos(topic)) for topic in topics}
-out[SCENE].publish(messages.text(case.to_yaml()))
-out[RUN].publish(messages.text(Running().to_yaml()))
+out[SCENE].publish(String(data=case.to_yaml()))
+out[RUN].publish(String(data=Running().to_yaml()))
 tick = 0
 while True:  # what belongs to a state comes up to 90 ticks behind it, as from a monitor that is busy
     rclpy.spin_once(node, timeout_sec=0.002)

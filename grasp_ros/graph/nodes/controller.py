@@ -13,15 +13,13 @@ from rclpy.parameter import Parameter
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
 from grasp_ros.graph.health.peers import Need, PeerNode
-from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.messages import State, StateReader
+from grasp_ros.graph.ros.messages import UNREADABLE, State, StateReader
 from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.serialization import list_message, template_of
 from grasp_ros.physics.control import FIXED, command_of, limited
 from grasp_ros.physics.errors import Refused, described
 from grasp_ros.physics.observation import Observation, asked, check
 from grasp_ros.physics.system import COLUMN, NAMES, System
-from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.own_law import begin, find_law
 from grasp_ros.scene.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, RUN, SCENE
@@ -56,7 +54,7 @@ class Controller(PeerNode):
         topic = COMMANDS[self._side]
         self._commands, self._template = self.publisher(topic), template_of(topic)
         self._announcements = self.publisher(CHANGES[self._side])
-        self._scene: Scene | None = None
+        self._scene: scenes.Scene | None = None
         self._staged: dict[str, float] = {}
         self._answered = -1  # time in ns of the last state answered; -1: none of this run
         self._force = 0.0  # that answer
@@ -102,12 +100,11 @@ class Controller(PeerNode):
             self._ready_to_answer = False
             self.when(self._ready, self._start)
 
-    def _take(self, scene: Scene) -> None:
+    def _take(self, scene: scenes.Scene) -> None:
         """Work with a scene from now on."""
         name = self._executable
         if name not in scene.controllers:
             raise SceneError(f"{SCENE.name}: has no {name}; allowed: {', '.join(scene.controllers) or 'none'}")
-        self.forget_scene()
         self._staged = self.declare_scene(scene, name)
         scene.changed(self._staged)  # refuses what was given at the start and cannot be run
         if self._own:
@@ -175,7 +172,7 @@ class Controller(PeerNode):
         assert self._scene is not None
         try:
             state, period_ns = self._reader.read(cdr), self._scene.period_ns
-        except messages.UNREADABLE:
+        except UNREADABLE:
             self.refuse("malformed messages", JOINT_STATES)
             return None
         known = state.time_ns == 0 or self._answered <= state.time_ns <= self._scene.ticks * period_ns

@@ -24,9 +24,8 @@ from grasp_ros.graph.lockstep.admission import Limits, Sources
 from grasp_ros.graph.lockstep.synchronizer import UNCERTAIN_SECONDS, Arrival, Synchronizer, Tick
 from grasp_ros.graph.nodes.lyapunov_monitor import MOST_BYTES, LyapunovMonitor
 from grasp_ros.graph.nodes.picture import Picture
-from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros.messages import UNREADABLE
 from grasp_ros.graph.ros.node import Phase
-from grasp_ros.graph.running import Running
 from grasp_ros.graph.serialization import template_of
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene, topics
@@ -52,7 +51,7 @@ class Monitor(PeerNode):
         super().__init__("monitor", **options)
         self._path = Path(self.read_only("bag") or f"grasp_{datetime.now():%Y_%m_%d-%H_%M_%S}")
         check_path(self._path)  # now, and not when a plant comes
-        self._running: Running | None = None
+        self._running: runnings.Running | None = None
         self._scene: Scene | None = None
         self._due: list[tuple[int, Tick, list[tuple[Topic, bytes]]]] = []  # time in the bag, tick, what comes beside
         self._others: list[Subscription] = []  # of what does not come with every state
@@ -163,7 +162,7 @@ class Monitor(PeerNode):
     def _on_announcement(self, side: str, cdr: bytes) -> None:
         try:
             self._lyapunov.announce(side, cdr)
-        except messages.UNREADABLE as error:  # `Refused` is a ValueError
+        except UNREADABLE as error:  # `Refused` is a ValueError
             self.refuse("refused announcements", topics.CHANGES[side], str(error))
         self.counters["lost announcements"] = self._lyapunov.lost
 

@@ -7,17 +7,16 @@ from collections.abc import Iterable
 
 import numpy as np
 from geometry_msgs.msg import Point
-from std_msgs.msg import ColorRGBA, Header
+from std_msgs.msg import ColorRGBA, Header, String
 from visualization_msgs.msg import Marker, MarkerArray
 
-from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.messages import State
+from grasp_ros.graph.ros.messages import State, to_time
 from grasp_ros.graph.ros.node import GraspNode
 from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
-from grasp_ros.scene.topics import CONTACTS, FRAME, MARKERS, ROBOT_DESCRIPTION
+from grasp_ros.scene.topics import FRAME, MARKERS, ROBOT_DESCRIPTION
 
 FRAME_SECONDS = 1 / 30  # wall time between two pictures
 SIZE, ROD = 0.06, 0.008  # m: edge of a mass, width of a spring and of an arrow
@@ -46,8 +45,7 @@ def robot_description(scene: Scene) -> str:
 def markers(scene: Scene, time_ns: int, state: Array) -> MarkerArray:
     """Masses as boxes, springs as lines from their rest, contact forces as arrows on the object."""
     system, found = scene.system, []
-    published = {output.topic: output.value(system, 0, state) for output in scene.outputs}
-    forces = {side: published[topic] for side, topic in CONTACTS.items() if topic in published}
+    forces = {NAMES[side]: system.impact(side, state.tolist()) for side in system.contacts}
     touching = {side for side, force in forces.items() if force > 0.0}
     for body in system.present:
         name, x = NAMES[body], float(state[COLUMN[body]])
@@ -70,7 +68,7 @@ def markers(scene: Scene, time_ns: int, state: Array) -> MarkerArray:
 
 def _marker(number: int, group: str, kind: int, time_ns: int, color: Iterable[float]) -> Marker:
     red, green, blue = color
-    header = Header(stamp=messages.to_time(time_ns), frame_id=FRAME)
+    header = Header(stamp=to_time(time_ns), frame_id=FRAME)
     return Marker(header=header, ns=group, id=number, type=kind, color=ColorRGBA(r=red, g=green, b=blue, a=1.0))
 
 
@@ -91,7 +89,7 @@ class Picture:
         self._scene, self._next = scene, 0.0
         self._markers = node.publisher(MARKERS)
         self._description = node.publisher(ROBOT_DESCRIPTION)
-        self._description.publish(messages.text(robot_description(scene)))
+        self._description.publish(String(data=robot_description(scene)))
 
     def show(self, state: State) -> None:
         """Draw a state, if it is time and somebody looks."""

@@ -12,6 +12,7 @@ from contextlib import ExitStack, suppress
 from typing import Any
 
 from rclpy.duration import Duration
+from std_msgs.msg import String
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status, compile_kernels
@@ -20,18 +21,14 @@ from grasp_ros.graph.health.peers import SLOW, Need, PeerNode
 from grasp_ros.graph.lockstep.free_running import FreeRunning
 from grasp_ros.graph.lockstep.lockstep import Lockstep
 from grasp_ros.graph.lockstep.steering import Steering
-from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.running import Running, check_factor
 from grasp_ros.graph.serialization import SHORTEST, raw_stamp_ns, template_of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
-from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW
 from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.sampled_plant import SampledPlant
-
-NO_TIME = Duration(seconds=0)
 
 
 class Plant(PeerNode):
@@ -70,14 +67,14 @@ class Plant(PeerNode):
         texts = [running.to_yaml(), self.scene.to_yaml()]
         self.heartbeats.own.texts = [digest(text) for text in texts]
         for publisher, text in zip(self._descriptions, texts, strict=True):
-            publisher.publish(messages.text(text))
+            publisher.publish(String(data=text))
         compile_kernels()  # while others get ready for this scene
         if self.monitored:
             self.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
         self.loop = FreeRunning(self, steering, running, waits) if free else Lockstep(self, steering)
         self.when(self._ready, self._start)
 
-    def _read_running(self, scene: Scene) -> Running:
+    def _read_running(self, scene: scenes.Scene) -> Running:
         """How it runs with the wall clock, from parameters that exist only there."""
         factor = self.read_only("real_time_factor")
         check_factor(factor)
@@ -172,7 +169,7 @@ class Plant(PeerNode):
         # Who has been here with another plant must have this scene before its first state.
         told = (*self._descriptions, self.heartbeats.publisher)
         known = all(publisher.get_subscription_count() >= len(self.readers(publisher))
-                    and publisher.wait_for_all_acked(NO_TIME) for publisher in told)
+                    and publisher.wait_for_all_acked(Duration(seconds=0)) for publisher in told)
         return not missing and known and self.linked(self._states, [*self.loop.topics, *monitor]) and all(
             self.linked(publisher, monitor) for publisher, _, _ in self._forces
         )

@@ -97,11 +97,6 @@ def to_ns(stamp: Time) -> int:
     return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
 
 
-def text(content: str) -> String:
-    """A text."""
-    return String(data=content)
-
-
 class State(NamedTuple):
     """A state of the plant."""
 

@@ -89,9 +89,12 @@ class ParameterNode(Node):
     def declare_scene(self, scene: Scene, executable: str) -> dict[str, Any]:
         """Declare the numbers of a scene that belong to an executable; returns what the start has put in their place.
 
-        The types are dynamic so that an integer will do for a floating-point number.
+        Those of a scene before are taken back. The types are dynamic so that an integer will do for a floating-point
+        number.
         """
         given = {}
+        for name in [name for name in self._parameters if "." in name]:  # rclpy does not let go of what is read-only
+            del self._parameters[name], self._descriptors[name]
         for effect in scene.effects:
             for parameter in effect.parameters if effect.node == executable else ():
                 if parameter.key not in scene.values[effect.section]:
@@ -122,11 +125,6 @@ class ParameterNode(Node):
             missed = free is not None and not free.value and name in FREE
             hint = "allowed: with free_running:=true" if missed else allowed(name, sorted(self._parameters))
             raise Refused(f"{', '.join(unknown)}: no such parameter; {hint}")
-
-    def forget_scene(self) -> None:
-        """Take back what `declare_scene` declared; rclpy itself does not let go of what is read-only."""
-        for name in [name for name in self._parameters if "." in name]:
-            del self._parameters[name], self._descriptors[name]
 
     def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
         """Set parameters; what is meant as a floating-point number becomes one, and a refusal says why.

@@ -26,7 +26,6 @@ from grasp_ros.graph import running as runnings
 from grasp_ros.graph.host import place
 from grasp_ros.graph.lockstep.steering import PAUSED
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.messages import StateReader
 from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.graph.serialization import MOST_BYTES, SHORTEST, raw_force, raw_stamp_ns
 from grasp_ros.graph.terminal import FRAME_SECONDS, Key, Keys, Moment, View
@@ -47,7 +46,7 @@ class Watch(GraspNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("watch", **options)
         self._view: View | None = None
-        self._reader, self._lockstep = StateReader(()), True
+        self._reader, self._lockstep = messages.StateReader(()), True
         self._seen: defaultdict[Topic, dict[int, bytes]] = defaultdict(dict)  # the last messages, by their stamps
         self._found: dict[Topic, bytes] = {}  # those of the newest state of which all have come
         self._state, self._stale = -1, 0.0  # stamp of the last one, and until when nothing but states is taken
@@ -72,7 +71,6 @@ class Watch(GraspNode):
         self.wall_timer(STATUS_SECONDS, self._ask_status)
         self.wall_timer(FRAME_SECONDS, self._look)
         self._keys, self._pressed, self._stepped = Keys(), list[Key](), -math.inf  # the last: since when one is done
-        self._keys.start()
 
     def _on_scene(self, message: Any) -> None:
         self._view = View(scenes.parse(message.data, SCENE.name, f"topic {SCENE.name}"))
