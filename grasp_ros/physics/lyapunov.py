@@ -80,8 +80,3 @@ def reach(bodies: Any, pairs: Any, V_c: Any) -> Any:
         arms = bodies[LEFT, Of.MASS] > 0.0 and bodies[RIGHT, Of.MASS] > 0.0
         middle = max(left + u_l, right + u_r) if arms and bodies[OBJECT, Of.FORCE] == 0.0 else np.inf
     return left, middle, right, u_l, u_r
-
-
-def displacement_bound(system: System, V_c: float) -> Array:
-    """What no displacement can exceed at a level of V_c in J: left, object, right, (3,) in m; see `reach`."""
-    return np.array(reach(system.closed_loop, system.pairs, V_c)[:3])

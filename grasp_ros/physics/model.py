@@ -68,12 +68,6 @@ def impact_force(contact: Contact, u: Array, u_rate: Array) -> Array:
     return np.where(in_contact(contact, u, u_rate), force, 0.0)
 
 
-def impact_force_of(hertzian: float, dissipation: float, u: float, u_rate: float) -> float:
-    """The same as `impact_force`, to the bit, of one u and u' in a twentieth of the time."""
-    factor = damping_factor(dissipation, u_rate)
-    return factor * float(elastic_force(hertzian, u)) if u >= 0.0 <= factor else 0.0
-
-
 def penetration(state: Array) -> tuple[Array, Array, Array, Array]:
     """u_l, u_l', u_r, u_r' of states (..., 6): (8)."""
     x_l, v_l, x_o, v_o, x_r, v_r = np.moveaxis(np.asarray(state), -1, 0)

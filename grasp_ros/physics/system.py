@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.physics.control import Column, ControlLaw, feedback
+from grasp_ros.physics.impact_law import damping_factor, elastic_force
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of
-from grasp_ros.physics.model import Arm, Array, impact_force_of
+from grasp_ros.physics.model import Arm, Array
 
 NO_LAW = ControlLaw()
 BODIES = (LEFT, OBJECT, RIGHT)  # in the order of the state
@@ -116,11 +117,12 @@ class System:
         return forces
 
     def impact(self, side: int, state: Sequence[float]) -> float:
-        """Impact force fw of a pair in N, in a state (6,)."""
+        """Impact force fw of a pair in N, in a state (6,); that of `model`, to the bit, in a twentieth of the time."""
         front, back = PAIR_COLUMNS[side]
         u, u_rate = (state[front + part] - state[back + part] for part in (0, 1))
         hertzian, dissipation = self.pairs[side].tolist()
-        return impact_force_of(hertzian, dissipation, u, u_rate)
+        factor = damping_factor(dissipation, u_rate)
+        return factor * float(elastic_force(hertzian, u)) if u >= 0.0 <= factor else 0.0
 
     def feedback(self, state: Array) -> Array:
         """Continuous feedback (n, 2) of the left and the right arm in N, (4), (5), for states (n, 6)."""

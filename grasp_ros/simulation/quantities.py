@@ -20,7 +20,7 @@ from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import whole
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
-from grasp_ros.physics.lyapunov import displacement_bound
+from grasp_ros.physics.lyapunov import reach
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
@@ -78,7 +78,8 @@ def settled_of(run: Trajectory, row: Mapping[str, float] | None) -> Array:
     system, distance = run.scene.system, settled_distance(run.scene)
     if row is not None:  # 0 for a mass that is not there
         return np.array([row[f"settling_time_{NAMES[body]}"] if body in system.present else 0.0 for body in COLUMN])
-    ahead = displacement_bound(system, float(run.energy.V_c[-1])) if len(run.t) else np.full(3, np.inf)
+    level = float(run.energy.V_c[-1]) if len(run.t) else np.inf
+    ahead = np.array(reach(system.closed_loop, system.pairs, level)[:3])
     if not np.isfinite(ahead).all():
         return np.full(3, np.nan)
     return last_outside(run.t, run.state[:, 0::2], distance) if (ahead <= distance).all() else np.full(3, np.inf)

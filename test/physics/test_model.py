@@ -8,15 +8,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from oracles import STANDARD, energy, make_grasp
 
-from grasp_ros.physics.model import (
-    Contact,
-    Mode,
-    hertzian_force,
-    impact_force,
-    impact_force_of,
-    in_contact,
-    penetration,
-)
+from grasp_ros.physics.layout import LEFT
+from grasp_ros.physics.model import Contact, Mode, hertzian_force, impact_force, in_contact, penetration
+from grasp_ros.physics.system import System
 from lab.reference.grasp import Grasp, acceleration, feedback, impact_forces
 
 RNG = np.random.default_rng(1990)
@@ -41,7 +35,8 @@ STATES = {
 @example(1e4, 1.0, -0.0, -2.0)
 def test_the_force_of_one_state_is_that_of_many(hertzian: float, dissipation: float, u: float, u_rate: float) -> None:
     many = impact_force(Contact(hertzian, dissipation), np.array([u]), np.array([u_rate]))
-    assert repr(impact_force_of(hertzian, dissipation, u, u_rate)) == repr(float(many[0]))
+    one = System(pairs=np.array([(hertzian, dissipation), (0.0, 0.0)])).impact(LEFT, [u, u_rate, *[0.0] * 4])
+    assert repr(one) == repr(float(many[0]))
 
 
 def test_hand_numbers() -> None:

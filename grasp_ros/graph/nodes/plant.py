@@ -167,9 +167,8 @@ class Plant(PeerNode):
             self.words = (f"waiting for publishers of {' and '.join(deaf) or 'a command'} to subscribe to"
                           f" {JOINT_STATES.name} and for connections")
         # Who has been here with another plant must have this scene before its first state.
-        told = (*self._descriptions, self.heartbeats.publisher)
-        known = all(publisher.get_subscription_count() >= len(self.readers(publisher))
-                    and publisher.wait_for_all_acked(Duration(seconds=0)) for publisher in told)
+        known = all(self.linked(publisher, ()) and publisher.wait_for_all_acked(Duration(seconds=0))
+                    for publisher in (*self._descriptions, self.heartbeats.publisher))
         return not missing and known and self.linked(self._states, [*self.loop.topics, *monitor]) and all(
             self.linked(publisher, monitor) for publisher, _, _ in self._forces
         )

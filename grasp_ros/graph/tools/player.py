@@ -46,9 +46,8 @@ class Player(GraspNode):
 
     def _ready(self) -> bool:
         """Whether somebody is there, and connected."""
-        readers = [(publisher.get_subscription_count(), len(self.readers(publisher)))
-                   for publisher in self._outputs.values()]
-        matched = any(there for _, there in readers) and all(own >= there for own, there in readers)
+        outputs = self._outputs.values()
+        matched = any(map(self.readers, outputs)) and all(self.linked(publisher, ()) for publisher in outputs)
         waited = time.monotonic() - self._created
         return waited > DISCOVERY_SECONDS and (matched or waited > MATCH_SECONDS)
 

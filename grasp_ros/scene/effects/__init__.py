@@ -1,7 +1,4 @@
-"""The effects that a scene can name: one file each, and one line each here.
-
-The order is that of the topics in a bag and that in which effects build the system.
-"""
+"""The effects that a scene can name, from a file each."""
 
 from collections.abc import Collection, Mapping
 from typing import Any
@@ -10,18 +7,9 @@ from grasp_ros.physics.system import System
 from grasp_ros.scene.effects import bodies, contact, feedback, force, friction, loop, saturation, sensing, tilt, time
 from grasp_ros.scene.effects.base import Effect
 
-EFFECTS = (
-    *time.EFFECTS,
-    *bodies.EFFECTS,
-    *feedback.EFFECTS,
-    *contact.EFFECTS,
-    *loop.EFFECTS,
-    *sensing.EFFECTS,
-    *saturation.EFFECTS,
-    *friction.EFFECTS,
-    *tilt.EFFECTS,
-    *force.EFFECTS,
-)
+# In the order of the topics in a bag, in which effects build the system, too.
+FILES = (time, bodies, feedback, contact, loop, sensing, saturation, friction, tilt, force)
+EFFECTS: tuple[Effect, ...] = tuple(effect for file in FILES for effect in file.EFFECTS)
 BY_SECTION = {effect.section: effect for effect in EFFECTS}
 
 
