@@ -17,7 +17,6 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.subscription import Subscription
 
 from grasp_ros.graph.ros.node import GraspNode
-from grasp_ros.graph.serialization import raw_command, raw_force
 from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import CHANGES, COMMANDS, Topic
 
@@ -43,18 +42,16 @@ class Limits:
             if other == name and 0.0 <= value < math.inf:
                 self._limits[topic] = value
 
-    def allow(self, topic: Topic, cdr: bytes) -> bool:
-        """Whether the actuator can do what a serialized command says."""
-        limit = self._limits.get(topic)
-        return limit is None or ((command := raw_command(cdr)) is not None and abs(command[1]) <= limit)
+    def allow(self, topic: Topic, force: float) -> bool:
+        """Whether the actuator can do a command in N."""
+        return abs(force) <= self._limits.get(topic, math.inf)
 
-    def admit(self, topic: Topic, cdr: bytes) -> bool:
+    def admit(self, topic: Topic, force: float) -> bool:
         """The same, and what it cannot do is counted."""
-        if self.allow(topic, cdr):
-            return True
-        why = f"{raw_force(cdr):g} N; allowed by the actuator of the scene: {self._limits[topic]:g} N"
-        self._node.refuse("commands beyond a limit", topic, why)
-        return False
+        if not (allowed := self.allow(topic, force)):
+            why = f"{force:g} N; allowed by the actuator of the scene: {self._limits[topic]:g} N"
+            self._node.refuse("commands beyond a limit", topic, why)
+        return allowed
 
 
 class Sources:

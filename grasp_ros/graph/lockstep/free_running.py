@@ -112,7 +112,7 @@ class FreeRunning:
             plant.refuse("refused commands", topic)
         elif not held.answers <= tick <= plant.tick:
             plant.count("stale commands")
-        elif self._limits.admit(topic, cdr):
+        elif self._limits.admit(topic, force):
             held.force, held.answers, held.ever = force, tick, True
             self.answered = self.answered or all(own.ever for own in self._held.values())
             self._awaits = self._awaits and not (self.answered and self._heard)

@@ -132,7 +132,7 @@ class Lockstep:
         elif topic in self._unsettled or not self._sources[topic].settled():  # it is asked for again
             self._unsettled.setdefault(topic, time.monotonic())
             self._plant.refuse("commands while sources change", topic)
-        elif self._limits.admit(topic, cdr):
+        elif self._limits.admit(topic, command[1]):
             self._commands[side] = command[1]
             self.advance()
 

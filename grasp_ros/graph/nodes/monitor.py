@@ -26,7 +26,7 @@ from grasp_ros.graph.nodes.lyapunov_monitor import MOST_BYTES, LyapunovMonitor
 from grasp_ros.graph.nodes.picture import Picture
 from grasp_ros.graph.ros.messages import UNREADABLE
 from grasp_ros.graph.ros.node import Phase
-from grasp_ros.graph.serialization import template_of
+from grasp_ros.graph.serialization import raw_command, template_of
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene, topics
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -168,7 +168,8 @@ class Monitor(PeerNode):
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
         sources = self._sources.get(topic)  # of commands: is this one nobody else's?
-        sure = sources is None or (sources.settled() and sources.now < 2 and self._limits.allow(topic, cdr))
+        sure = sources is None or (sources.settled() and sources.now < 2 and (command := raw_command(cdr)) is not None
+                                   and self._limits.allow(topic, command[1]))
         arrival = self._synchronizer.put(topic, cdr, sure)
         if arrival is Arrival.TAKEN:
             self._drain()
