@@ -17,22 +17,14 @@ def _read_only(array: Any) -> Any:
     return view
 
 
-def _unchangeable(mapping: Any) -> Any:
-    return MappingProxyType({key: frozen(entry) for key, entry in mapping.items()})
-
-
-def _frozen_record(record: Any) -> Any:
-    return type(record)(*map(frozen, record))
-
-
 @cache
 def _freezer(kind: type) -> Callable[[Any], Any] | None:
     """What freezes values of a type; None: the value is kept."""
     if issubclass(kind, np.ndarray):
         return _read_only
     if hasattr(kind, "items"):
-        return _unchangeable
-    return _frozen_record if issubclass(kind, tuple) and hasattr(kind, "_fields") else None
+        return lambda mapping: MappingProxyType({key: frozen(entry) for key, entry in mapping.items()})
+    return (lambda record: kind(*map(frozen, record))) if issubclass(kind, tuple) and hasattr(kind, "_fields") else None
 
 
 def frozen(value: Any) -> Any:

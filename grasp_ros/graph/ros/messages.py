@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
-from rclpy.duration import Duration, Infinite
+from rclpy.duration import Infinite
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
@@ -75,16 +75,11 @@ def glance_qos(topic: Topic) -> QoSProfile:
 
 def connects(writer: QoSProfile, reader: QoSProfile) -> bool:
     """Whether DDS connects them; `rclpy.qos.qos_check_compatible` takes an infinite deadline for a finite one."""
-    # Of the first two enums the smaller ones promise more.
+    # Of the first two enums the smaller ones promise more; of times, those that are no longer, and 0 is for ever, too.
+    times = ((writer.deadline, reader.deadline), (writer.liveliness_lease_duration, reader.liveliness_lease_duration))
     return (writer.reliability <= reader.reliability and writer.durability <= reader.durability
             and reader.liveliness in (*AUTOMATIC, writer.liveliness)
-            and _within(writer.deadline, reader.deadline)
-            and _within(writer.liveliness_lease_duration, reader.liveliness_lease_duration))
-
-
-def _within(offered: Duration, asked: Duration) -> bool:
-    """Whether a time that a writer offers is no longer than the one that a reader asks for; 0 is for ever, too."""
-    return bool((offered.nanoseconds or FOREVER) <= (asked.nanoseconds or FOREVER))
+            and all((offered.nanoseconds or FOREVER) <= (asked.nanoseconds or FOREVER) for offered, asked in times))
 
 
 def to_time(time_ns: int) -> Time:
