@@ -121,13 +121,7 @@ def check(
         raise Refused(f"{name}: only continuous feedback; allowed for sampled feedback: {_able('sampled')}")
     if max_work != MAX_WORK and not method.work_budget:
         raise Refused(f"{name}: has no budget of work; allowed with one: {_able('work_budget')}")
-    forces = [
-        f"{section}.{key}" for section in ("left_feedback", "right_feedback")
-        for key in ("set_point_m", "feed_forward_N") if scene.values.get(section, {}).get(key)
-    ]
-    lacking, beside = sorted(PAPER - set(scene.values)), sorted([*set(scene.values) - PAPER, *forces])
-    odd = [f"{word} {', '.join(found)}" for word, found in (("lacks", lacking), ("has", beside)) if found]
-    if odd and not method.effects:
+    if not method.effects and (odd := _beside_the_paper(scene)):
         raise Refused(
             f"{name}: {scene.name} {'; '.join(odd)}; it knows the paper's grasp alone: two arms with feedback to 0, an"
             f" object and both contacts; allowed here: {_able('effects')}"
@@ -140,3 +134,13 @@ def check(
 def _able(capability: str) -> str:
     """Names of the methods that declare a capability."""
     return ", ".join(name for name, method in METHODS.items() if getattr(method, capability))
+
+
+def _beside_the_paper(scene: Scene) -> list[str]:
+    """In words: what a scene lacks of the paper's grasp and its feedback, and what it has beside."""
+    forces = [
+        f"{section}.{key}" for section in ("left_feedback", "right_feedback")
+        for key in ("set_point_m", "feed_forward_N") if scene.values.get(section, {}).get(key)
+    ]
+    lacking, beside = sorted(PAPER - set(scene.values)), sorted([*set(scene.values) - PAPER, *forces])
+    return [f"{word} {', '.join(found)}" for word, found in (("lacks", lacking), ("has", beside)) if found]
