@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 from rclpy.serialization import deserialize_message
@@ -26,20 +25,13 @@ MOST_BYTES = 2**16  # of a message beside the states
 EXPLAINED = 1e-9  # of the sizes of its terms: two ways of rounding one law
 
 
-class Announcement(NamedTuple):
-    """Numbers of one controller's law, and the time from which they act."""
-
-    time_ns: int
-    numbers: Mapping[str, float]
-    cdr: bytes  # as it came
-
-
 class LyapunovMonitor:
     """V, the energy balance and the mode of each tick, by the laws that were announced."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._waiting: dict[str, deque[Announcement]] = {side: deque() for side in SIDES}
+        # What each controller has announced of its law: time in ns from which it acts, numbers, the message as it came.
+        self._waiting: dict[str, deque[tuple[int, dict[str, float], bytes]]] = {side: deque() for side in SIDES}
         self._acting: dict[str, int] = {}  # time in ns of the last announcement that acts, where one is known
         self._numbers = {side: Numbers(late=True) for side in SIDES}
         self.lost = 0  # announcements that never came
@@ -58,17 +50,16 @@ class LyapunovMonitor:
         message = deserialize_message(cdr, JointState)
         self.lost += self._numbers[side].take(message)
         stamp, numbers = to_ns(message.header.stamp), dict(zip(message.name, message.position, strict=True))
-        announcement = Announcement(stamp, numbers, cdr)
         wanted = set(self._scene.numbers_of(f"{side}_controller"))
-        if set(announcement.numbers) != wanted:
-            raise Refused(f"{side}/parameters: {', '.join(announcement.numbers) or 'nothing'}; allowed: exactly"
+        if set(numbers) != wanted:
+            raise Refused(f"{side}/parameters: {', '.join(numbers) or 'nothing'}; allowed: exactly"
                           f" {', '.join(sorted(wanted)) or 'nothing, this scene has no such controller'}")
-        self._scene.changed(announcement.numbers)
+        self._scene.changed(numbers)
         if self._before is None and not self._acting:  # what came before is of the run before: topics keep the last one
             self._waiting[side].clear()
         if len(self._waiting[side]) >= MOST_WAITING:
             raise Refused(f"{side}/parameters: more than {MOST_WAITING} laws that wait; allowed: at most that")
-        self._waiting[side].append(announcement)
+        self._waiting[side].append((stamp, numbers, cdr))
 
     def restart(self) -> None:
         """Forget the last tick and what it was announced for: time went back."""
@@ -77,7 +68,7 @@ class LyapunovMonitor:
 
     def _is_due(self, side: str, time_ns: int) -> bool:
         waiting = self._waiting[side]
-        return bool(waiting) and self._acting.get(side, -1) < waiting[0].time_ns <= time_ns
+        return bool(waiting) and self._acting.get(side, -1) < waiting[0][0] <= time_ns
 
     def changes(self, time_ns: int) -> bool:
         """Whether a law begins to act at a time."""
@@ -92,11 +83,10 @@ class LyapunovMonitor:
         begun = []
         for side, waiting in self._waiting.items():
             while self._is_due(side, time_ns):
-                announcement = waiting.popleft()
-                self._acting[side] = announcement.time_ns
-                if dict(announcement.numbers) != self._scene.numbers_of(f"{side}_controller"):
-                    self._scene = self._scene.changed(announcement.numbers)
-                begun.append((side, announcement.cdr))
+                self._acting[side], numbers, cdr = waiting.popleft()
+                if numbers != self._scene.numbers_of(f"{side}_controller"):
+                    self._scene = self._scene.changed(numbers)
+                begun.append((side, cdr))
         return begun
 
     def evaluate(self, ticks: Sequence[Tick]) -> list[list[float]]:
