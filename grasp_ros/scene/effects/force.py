@@ -121,12 +121,8 @@ def _odd_table(section: str, sections: Sections, _: System) -> Iterable[str]:
         yield oddity(key, idle[0], "is not before the run's end: its force never acts", f"a last time {meant}")
 
 
-def _total(body: int, system: System, tick: int, _: Array) -> float:
-    return float(system.external_at(tick)[body])
-
-
 def _effects(name: str, body: int) -> Iterable[Effect]:
-    outputs = (Output(EXTERNAL_FORCES[name], partial(_total, body)),)
+    outputs = (Output(EXTERNAL_FORCES[name], lambda system, tick, _: float(system.external_at(tick)[body])),)
     work = "the force does work: V_c rises by at most twice its work"
     for kind, parameters, size, build, problems, odd, example in (
         ("pulse", PULSE, "force_N", _build_steps, partial(_off_tick, ("start_s", "length_s")),
