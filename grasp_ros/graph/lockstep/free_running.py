@@ -107,8 +107,7 @@ class FreeRunning:
         plant, held, command = self._plant, self._held[side], raw_command(cdr)
         stamp, force = command or (0, math.nan)
         tick = stamp // plant.scene.period_ns if stamp else plant.tick
-        overtaken = plant.resets > 0 and not held.ever  # if it comes from before a reset
-        if command is None or (tick > plant.tick and not overtaken):
+        if command is None or (tick > plant.tick and not plant.resets):  # else it may come from before a reset
             plant.refuse("refused commands", topic)
         elif not held.answers <= tick <= plant.tick:
             plant.count("stale commands")

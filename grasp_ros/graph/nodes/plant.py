@@ -105,10 +105,11 @@ class Plant(PeerNode):
     def _on_lyapunov(self, cdr: bytes) -> None:
         stamp = raw_stamp_ns(cdr) if len(cdr) >= SHORTEST else -1
         tick, rest = divmod(stamp, self.scene.period_ns)
-        if self.resets and self._recorded < 0 < tick and not rest:  # it was on its way when the plant was put back
-            return
-        if rest or not max(self._recorded, 0) <= tick <= self.tick:
+        fits = max(self._recorded, 0) <= tick <= self.tick
+        if rest or not (fits or self.resets):
             self.refuse("refused records", LYAPUNOV)
+            return
+        if not fits or (self.resets and self._recorded < 0 < tick):  # it was on its way when the plant was put back
             return
         self._recorded, self.heard_of_record = tick, time.monotonic()
         self.loop.advance()
