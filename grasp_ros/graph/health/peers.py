@@ -208,7 +208,8 @@ class PeerNode(GraspNode):
             when, topic, text, take = entry
             name = digest(text)
             beat = self.heartbeats.vouched(name)
-            if beat is None and time.monotonic() - when < self.patience:
+            over = any(own.ended for own in self.heartbeats.of(self.sources(topic)))  # nobody vouches for it any more
+            if beat is None and (over or time.monotonic() - when < self.patience):
                 continue
             self._texts.remove(entry)
             if beat is None and not self._is_foreign(topic):
