@@ -23,7 +23,7 @@ from grasp_ros.sensitivity.run import Carrier
 
 PIECE_S, MOST_PIECES = 0.5, 2**17  # of time: the longest, and how many
 FALL = 1e-10  # of a tangent within a piece, to what is left of it at right angles to others: below, it has few digits
-AGREE = 1e-3  # of logarithms of growth, from pieces to half as long ones
+AGREE = 0.1  # of the largest logarithm of growth, from pieces to half as long ones: chaotic runs end elsewhere
 DECAY = 10.0  # time constants of the dampers in a piece, at most
 
 
@@ -31,7 +31,7 @@ def spectrum(scene: Scene, *, accuracy: float = ACCURACY) -> Array:
     """Lyapunov exponents (2 b,) of a run of b bodies under continuous feedback, descending, 1/s.
 
     Lengths are those of states (x, v) in m and m/s. An object that sticks loses a direction: its exponent is -inf, and
-    so is that of another one of which no digit is left when it sticks again. NaN: of which no three digits are known.
+    so is that of another one of which no digit is left when it sticks again. NaN: of which no digit is known.
 
     Raises
     ------
@@ -49,9 +49,9 @@ def spectrum(scene: Scene, *, accuracy: float = ACCURACY) -> Array:
         grown = _growth(scene, places, accuracy, pieces)
         if grown is not None and before is not None:  # within a piece tangents may grow, and fall again
             known = min(len(grown), len(before))
-            close = np.isclose(grown[:known], before[:known], rtol=AGREE, atol=AGREE)
+            close = np.abs(grown[:known] - before[:known]) <= AGREE * np.abs(grown).max(initial=0.0)
             lost = np.full(len(places) - known, -np.inf)
-            return np.concatenate([np.where(close, grown[:known] / scene.duration, np.nan), lost])
+            return np.concatenate([np.where(close, before[:known] / scene.duration, np.nan), lost])
         pieces, before = 2 * pieces, grown
     raise Refused(f"{scene.name}: Lyapunov exponents: tangents lose their digits within"
                   f" {scene.duration / MOST_PIECES:.3g} s; allowed: slower ones, or a shorter time.duration_s")
