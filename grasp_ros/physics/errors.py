@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import islice
-from traceback import extract_tb
+from traceback import FrameSummary, extract_tb
 
 OTHERS = re.compile("/lib/python3[^/]*/(?!(site|dist)-packages/(?!(rclpy|numba)/))")  # of Python, rclpy, numba
 LONGEST = 4000  # characters of a sentence
@@ -19,18 +19,19 @@ def printable(text: str) -> str:
     return "".join(sign if sign.isprintable() or sign == "\n" else repr(sign)[1:-1] for sign in text)
 
 
-def described(error: BaseException) -> str:
-    """What went wrong in somebody else's code, and where: "ValueError: words, file, line n".
+def place_of(stack: Sequence[FrameSummary]) -> str:
+    """The innermost line of a stack, "file, line n"; if possible not in Python's own library, rclpy or numba."""
+    place = next((place for place in reversed(stack) if not OTHERS.search(place.filename)), stack[-1])
+    return f"{place.filename}, line {place.lineno}"
 
-    The place is, if possible, not in Python's own library, rclpy or numba.
-    """
+
+def described(error: BaseException) -> str:
+    """What went wrong in somebody else's code, and where: "ValueError: words, file, line n"."""
     try:
         words = " ".join(str(error).split())
     except Exception:  # its `__str__` is somebody else's, too
         words = "without words"
-    places = extract_tb(error.__traceback__)
-    place = next((place for place in reversed(places) if not OTHERS.search(place.filename)), places[-1])
-    return ": ".join(filter(None, [type(error).__name__, words])) + f", {place.filename}, line {place.lineno}"
+    return ": ".join(filter(None, [type(error).__name__, words])) + f", {place_of(extract_tb(error.__traceback__))}"
 
 
 class Refused(ValueError):  # noqa: N818 - it is what happens to the input, and no error of the package

@@ -85,7 +85,7 @@ def compose(
         if not len(instance("motion", motion, Tabular, A_MOTION).t) or motion.t[0] == motion.t[-1]:
             raise Refused("nothing to draw: the motion has fewer than two output times")
     captions = names("captions", captions if captions is not None else [
-        motion.scene.feedback_in_words(getattr(motion, "sampled", True)) for motion in motions])  # a bag has held ones
+        motion.scene.feedback_in_words(_sampled(motion)) for motion in motions])
     if not 0 < len(motions) == len(captions):
         raise Refused(f"captions: {len(captions)} for {len(motions)} motions; allowed: a motion, and one for each")
     usual = WIDTH_MM if len(motions) == 1 else 150.0 * len(motions)
@@ -126,6 +126,11 @@ def compose(
         return figure
 
 
+def _sampled(motion: Motion) -> bool:
+    """Whether commands are held, as in every recording."""
+    return getattr(motion, "sampled", True)
+
+
 def end_of(motion: Motion) -> float:
     """The end of its scene in s, or of a recording whose time goes on behind a reset."""
     return float(max(motion.scene.duration, *motion.t[-1:]))
@@ -163,7 +168,7 @@ def driven(motion: Motion) -> list[int]:
 
 def inputs(axes: Axes, motion: Motion) -> None:
     """Forces of controllers and from outside; what is held from tick to tick as steps."""
-    forces, style = motion.inputs, "steps-post" if getattr(motion, "sampled", True) else "default"
+    forces, style = motion.inputs, "steps-post" if _sampled(motion) else "default"
     for body in driven(motion):
         axes.plot(motion.t, forces[:, body], label=f"input_{NAMES[body]}", color=COLORS[body], linewidth=1.0,
                   drawstyle=style)

@@ -208,8 +208,7 @@ class PeerNode(GraspNode):
             when, topic, text, take = entry
             name = digest(text)
             beat = self.heartbeats.vouched(name)
-            over = any(own.ended for own in self.heartbeats.of(self.sources(topic)))  # nobody vouches for it any more
-            if beat is None and (over or time.monotonic() - when < self.patience):
+            if beat is None and (time.monotonic() - when < self.patience or self._has_ended(topic)):
                 continue
             self._texts.remove(entry)
             if beat is None and not self._is_foreign(topic):
@@ -217,6 +216,10 @@ class PeerNode(GraspNode):
             elif (known := (name, beat.identity if beat else "")) != self._taken.get(topic) or beat is None:
                 self._taken[topic] = known
                 take(text)
+
+    def _has_ended(self, topic: Topic) -> bool:
+        """Whether a source of a topic has just ended, so that nobody vouches for its texts any more."""
+        return any(beat.ended for beat in self.heartbeats.of(self.sources(topic)))
 
     def _is_foreign(self, topic: Topic) -> bool:
         """Whether a text may be that of a plant of another make: nobody vouches for any, and states come from there."""

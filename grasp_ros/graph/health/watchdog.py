@@ -9,13 +9,14 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from traceback import extract_stack
 from types import FrameType
 
 from rclpy.node import Node
 
 from grasp_ros.graph.health.heartbeat import HEARTBEAT_SECONDS
 from grasp_ros.graph.stopping import tell_parent
-from grasp_ros.physics.errors import OTHERS
+from grasp_ros.physics.errors import place_of
 
 EVERY_SECONDS = 5.0  # from one sentence to the next
 PAUSE_SECONDS = 2.0 * HEARTBEAT_SECONDS  # between two beats, if the process was stopped itself
@@ -63,7 +64,7 @@ class Watchdog:
         if not frozen and seconds <= most:
             return
         frame = sys._current_frames()[threading.main_thread().ident or 0]  # in which the nodes are
-        why = f"{frozen} suspended" if frozen else f"in {_line_of(frame)}"
+        why = f"{frozen} suspended" if frozen else f"in {place_of(extract_stack(frame))}"
         name = self._name if frozen else _node_of(frame) or self._name
         if self._beaten - self._said > EVERY_SECONDS:
             self._said = self._beaten
@@ -73,15 +74,6 @@ class Watchdog:
         if self._ends:
             tell_parent(name, f"blocked for {seconds:.1f} s: {why}")
             os._exit(1)
-
-
-def _line_of(frame: FrameType) -> str:
-    """The innermost line that is, if possible, not in Python's own library, rclpy or numba."""
-    own: FrameType | None = frame
-    while own is not None and OTHERS.search(own.f_code.co_filename):
-        own = own.f_back
-    own = own or frame
-    return f"{own.f_code.co_filename}, line {own.f_lineno}"
 
 
 def _node_of(frame: FrameType | None) -> str:
