@@ -21,7 +21,7 @@ from grasp_ros.graph.bag.rosbag2 import topics_of
 from grasp_ros.graph.health.heartbeat import digest
 from grasp_ros.graph.health.peers import Need, PeerNode
 from grasp_ros.graph.lockstep.admission import Limits, Sources
-from grasp_ros.graph.lockstep.synchronizer import UNCERTAIN_SECONDS, Arrival, Synchronizer, Tick
+from grasp_ros.graph.lockstep.synchronizer import ARMS, GIVE_UP_SECONDS, UNCERTAIN_SECONDS, Arrival, Synchronizer, Tick
 from grasp_ros.graph.nodes.lyapunov_monitor import MOST_BYTES, LyapunovMonitor
 from grasp_ros.graph.nodes.picture import Picture
 from grasp_ros.graph.ros.messages import UNREADABLE
@@ -35,6 +35,7 @@ from grasp_ros.scene.versions import versions
 
 MOST_TICKS, MOST_SECONDS = 128, 0.05  # that are evaluated at once, and of wall time that a tick waits for others
 BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what came before a signal, and without any more of it
+LOOK_SECONDS = 0.01  # between looks for commands that are missing at the end
 MOST_BESIDE_BYTES = 2**24  # beside the states: of a topic from report to report
 DIAGNOSTICS_LEFT_OUT = "diagnostics not recorded"  # which anybody on the host may send
 
@@ -60,6 +61,8 @@ class Monitor(PeerNode):
         self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
         self._plant, self._at_end = "", False  # identity of the one that is recorded; whether its last tick is
         self._sources: dict[Topic, Sources] = {}  # of commands that come with every state
+        self._acted = [0.0, 0.0, 0.0]  # N by body, in the last state
+        self._commands: dict[Topic, deque[float]] = {}  # the last ones of a free run, N
         self._bag_ns = self._offset_ns = 0  # time in the bag, and what it is ahead of simulated time
         self.counters.update(ticks=0, resets=0, **{
             "lost messages": 0, "messages without a state": 0, "refused announcements": 0, "lost announcements": 0,
@@ -119,7 +122,7 @@ class Monitor(PeerNode):
         if (scene := self._scene) is None or (running := self._running) is None:
             return
         beside = [] if running.lockstep else [topics.TIMING, *scene.controllers.values()]
-        self._awaited = {topic.name for topic in beside} - {topics.TIMING.name}
+        self._commands = {topic: deque(maxlen=topics.DEPTH + scene.system.delay) for topic in beside[1:]}
         per_tick = [topic for topic in scene.topics if topic != topics.LYAPUNOV and topic not in beside]
         self._lyapunov, self._picture = LyapunovMonitor(scene), Picture(self, scene)
         self._synchronizer = Synchronizer(
@@ -147,7 +150,8 @@ class Monitor(PeerNode):
     def _record(self, topic: Topic, cdr: bytes) -> None:
         """Keep what does not come with every state, at the time of the last one, as long as it is not too much."""
         self._beside[topic] += len(cdr)
-        if topic in topics.COMMANDS.values():
+        if topic in self._commands:
+            self._commands[topic].append((raw_command(cdr) or (0, 0.0))[1])
             self.heartbeats.confirm(topic.name)
             self._let_wait()
         if len(cdr) > MOST_BYTES or self._beside[topic] > MOST_BESIDE_BYTES:
@@ -202,6 +206,7 @@ class Monitor(PeerNode):
             self._lyapunov.restart()
             self.count("resets")
         self._bag_ns, self._advanced = tick.time_ns + self._offset_ns, time.monotonic()
+        self._acted = tick.state.inputs
         self.count("restored commands", tick.restored)
         self.count("lost messages", tick.lost)
         self.count("messages without a state", tick.dropped)
@@ -220,7 +225,8 @@ class Monitor(PeerNode):
 
     def _begins(self) -> bool:
         """Whether the first state of a free run waits for its laws, which are announced before the first commands."""
-        return not self.counters["ticks"] and len(self._due) < 2 and bool(self._awaited - {*self.heartbeats.own.hears})
+        unheard = {topic.name for topic in self._commands} - {*self.heartbeats.own.hears}
+        return not self.counters["ticks"] and len(self._due) < 2 and bool(unheard)
 
     def _complete(self) -> None:
         """Evaluate, record and publish the ticks that wait; none after an alarm."""
@@ -272,12 +278,22 @@ class Monitor(PeerNode):
                 quiet = time.monotonic()
         self._complete()
 
+    def _take_commands(self) -> None:
+        """Record the commands that acted in a free run: it may have been behind, and DDS sends again what was lost."""
+        end = time.monotonic() + GIVE_UP_SECONDS
+        self.take_waiting(self._others, topics.DEPTH)
+        while time.monotonic() < end and any(
+            (force := self._acted[ARMS[topic]]) and force not in self._commands[topic] for topic in self._commands
+        ):
+            time.sleep(LOOK_SECONDS)
+            self.take_waiting(self._others, topics.DEPTH)
+
     def close(self) -> None:
         """Close the bag; then let the plant have the last value."""
         if self.begun:
             with suppress(*[BagError] if self.exit_code else []):  # it has been said
                 self._take_what_came()
-                self.take_waiting(self._others, topics.DEPTH)  # what came with the last states: it may have been behind
+                self._take_commands()
                 self._recorder.close(self.counters)
                 self.get_logger().info(f"closed the bag {self._path}: {self.counters['ticks']} ticks")
         if self.finished:
