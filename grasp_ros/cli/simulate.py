@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import os
+from contextlib import chdir
 from typing import Any
 
 import numpy as np
@@ -66,13 +66,13 @@ def _simulate(options: argparse.Namespace) -> int:
     from grasp_ros.simulation.quantities import summary
 
     scene = load_scene(options.scene, options.settings)
-    here = os.open(".", os.O_RDONLY)
     knob = METHODS[options.method].knob
     given = {STEP: options.step, TOLERANCE: options.tolerance, ACCURACY_KNOB: options.accuracy}
     for other, number in given.items():
         if other != knob and number not in (None, ACCURACY):
             raise Refused(f"--{other} is not allowed; allowed for {options.method}: --{knob}")
-    controllers = load_controllers(options.controllers)
+    with chdir("."):  # and back: the user's module and law may leave it
+        controllers = load_controllers(options.controllers)
     sampled = options.sampled or bool(controllers)
     check_memory(scene, sampled, options.grid)
     check_output(options.output, (".npz", ".csv"), options.force, [options.scene])
@@ -82,15 +82,13 @@ def _simulate(options: argparse.Namespace) -> int:
         on_ticks = every and not rest and (sampled or scene.sampled)
         grid = tick_times(scene)[::every] if on_ticks else np.linspace(0.0, scene.duration, options.grid)
     prepare()
-    with bar(scene.duration, "s", scene.name) as progress:
+    with bar(scene.duration, "s", scene.name) as progress, chdir("."):
         trajectory = simulate(
             scene, grid=grid, sampled=sampled, controllers=controllers, method=options.method, setting=given[knob],
             max_events=options.max_events, max_work=options.max_work,
             sensitivity=options.sensitivity or None,
             progress=None if knob == STEP else progress,
         )
-    os.fchdir(here)  # a law may have called os.chdir
-    os.close(here)
     found = summary(trajectory)
     rows = describe_trajectory(trajectory, found)
     rates = trajectory.sensitivity
