@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import resource
 from contextlib import suppress
 from pathlib import Path
 
@@ -17,14 +18,29 @@ class Sink:
 
     def __init__(self, path: Path, reserve: Path) -> None:
         self.file, self._spare = (os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644) for new in (path, reserve))
-        self._reserve, self._held, self._size = reserve, 0, 0
-        self.full = 0  # the error, one of FULL
+        self._reserve, self._reserved, self._size = reserve, 0, 0
+        self._full = 0  # the error, one of FULL
 
-    def hold(self, size: int) -> None:
-        """Have at least this many bytes in reserve; grows in steps."""
-        if size > self._held:
-            os.posix_fallocate(self._spare, 0, size + RESERVE_BYTES)
-            self._held = size + RESERVE_BYTES
+    def reserve(self, size: int) -> str:
+        """Keep at least this many bytes for the end of the file, in steps; why that cannot be, empty if it can."""
+        limit, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
+        if limit != resource.RLIM_INFINITY and limit - self._size < size:
+            self._full = self._full or errno.EFBIG
+        if size > self._reserved and not self._full:
+            try:
+                os.posix_fallocate(self._spare, 0, size + RESERVE_BYTES)
+                self._reserved = size + RESERVE_BYTES
+            except OSError as error:
+                self._note(error)
+        if not self._full:
+            return ""
+        return "files may not be larger" if self._full == errno.EFBIG else "no space is left on the disk"
+
+    def _note(self, error: OSError) -> None:
+        """Note that the disk is full, or the file as large as it may be; other errors are raised."""
+        if self._full or error.errno not in FULL:
+            raise error
+        self._full = error.errno
 
     def release(self) -> None:
         """Give the reserve back; does nothing the second time."""
@@ -42,9 +58,7 @@ class Sink:
             try:
                 done = os.write(self.file, rest)
             except OSError as error:
-                if self.full or error.errno not in FULL:
-                    raise
-                self.full = error.errno
+                self._note(error)
                 self.release()
                 continue
             self._size += done

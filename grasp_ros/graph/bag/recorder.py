@@ -7,10 +7,8 @@ bag is closed, not cut off.
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import os
-import resource
 import struct
 import threading
 from collections.abc import Iterable, Iterator, Mapping
@@ -26,7 +24,7 @@ from mcap.records import ChunkIndex, MessageIndex
 from mcap.writer import CompressionType, IndexType, Writer
 
 from grasp_ros.graph.bag import BagError, rosbag2
-from grasp_ros.graph.bag.disk import CHUNK_BYTES, FULL, RESERVE_BYTES, Sink
+from grasp_ros.graph.bag.disk import CHUNK_BYTES, RESERVE_BYTES, Sink
 from grasp_ros.graph.running import Running
 from grasp_ros.graph.serialization import template_of
 from grasp_ros.scene import Scene
@@ -35,9 +33,9 @@ from grasp_ros.scene.files import writing
 from grasp_ros.scene.strict_yaml import dump
 from grasp_ros.scene.topics import CLOCK, RUN, SCENE, Topic
 
-PRIVATE = [f"_Writer__{name}" for name in ("chunk_builder", "statistics", "chunk_indices")]  # there is no door
+PRIVATE = [f"_Writer__{name}" for name in ("chunk_builder", "statistics", "chunk_indices")]  # of the library
 FLUSH_SECONDS = 0.1  # a kill loses what came after the last flush; flush and disk have as long again
-INDEX_BYTES = 256  # at most what the index holds of one chunk
+INDEX_BYTES = 512  # that are reserved for what the index holds of one chunk: twice the most that it needs
 HEAD: struct.Struct = struct.Struct("<BQ")  # opcode and length of every record of MCAP
 MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # the same of a message, its channel, number and both times
 OWN_RECORD, LOST_RECORD = "grasp_ros", "grasp_ros/lost"
@@ -81,7 +79,7 @@ class ChunkIndexes:
 def check_path(path: Path) -> None:
     """Refuse a path at which a bag cannot be made."""
     with writing(f"bag: {path}"):
-        with suppress(FileNotFoundError):  # what else is wrong with the path is told
+        with suppress(FileNotFoundError):  # any other error refuses the path
             path.lstat()
             raise FileExistsError
         there = next(parent for parent in path.absolute().parents if parent.exists())
@@ -108,7 +106,6 @@ class Recorder:
         self._topics = rosbag2.topics_of(scene)
         self._last_ns = self._next = 0
         self._gaps: list[tuple[int, int]] = []
-        self._waiting = self._chunks = 0
         self._closed, self._error = False, ""
         self._lock, self._stop = threading.Lock(), threading.Event()
         words = {f"{VERSION}{name}": word for name, word in sorted(versions.items())}
@@ -179,7 +176,7 @@ class Recorder:
             if tick > self._next:
                 self._gaps.append((self._next, tick - 1))
             self._last_ns, self._next = time_ns, tick + 1
-            if self._waiting > CHUNK_BYTES:
+            if self._chunk.count > CHUNK_BYTES:
                 self._flush()
 
     def write(self, topic: Topic, cdr: bytes) -> None:
@@ -204,26 +201,13 @@ class Recorder:
         length = MESSAGE_HEAD.size - HEAD.size + len(cdr)
         head = MESSAGE_HEAD.pack(Opcode.MESSAGE, length, channel, number, time_ns, time_ns)
         chunk.record_writer.write(head + cdr)
-        self._waiting += len(cdr)
 
     def _flush(self) -> None:
         """End the chunk; close the bag while there is room for its end, and say why."""
-        if not self._waiting:
+        if not self._chunk.num_messages:
             return
         self._writer.flush()  # type: ignore[no-untyped-call]
-        self._waiting, self._chunks = 0, self._chunks + 1
-        index = INDEX_BYTES * self._chunks
-        try:
-            if not self._sink.full:
-                self._sink.hold(RESERVE_BYTES + 2 * index)
-        except OSError as error:
-            if error.errno not in FULL:
-                raise
-            self._sink.full = error.errno
-        limit, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
-        room = limit - self._sink.tell() if limit != resource.RLIM_INFINITY else RESERVE_BYTES + index
-        if self._sink.full or room < RESERVE_BYTES + index:
-            why = "files may not be larger" if self._sink.full in (0, errno.EFBIG) else "no space is left on the disk"
+        if why := self._sink.reserve(RESERVE_BYTES + INDEX_BYTES * self._statistics.chunk_count):
             until = f"the recording ends at {self._last_ns / NANOSECONDS} s"
             self._error = (f"{self._path}: {until}: {why}; the bag is closed, and whole up to there" if self._next else
                            f"{self._path}: no tick could be recorded: {why}")
@@ -294,7 +278,6 @@ class Recorder:
         })
         self._writer.finish()  # type: ignore[no-untyped-call]
         os.fsync(self._sink.file)
-        whole = self._path / "metadata.yaml"
-        part = whole.with_suffix(".part")
+        part = self._path / "metadata.part"
         part.write_text(text, encoding="utf-8")
-        part.replace(whole)
+        part.replace(self._path / "metadata.yaml")
