@@ -1,4 +1,4 @@
-"""Bags: written, read, verified, recovered, and told in a few numbers."""
+"""Bags: recorded, read, verified, recovered and summarized."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,7 @@ class EmptyBagError(BagError):
 
 
 def __getattr__(name: str) -> Any:
-    """What reads, with the simulation that it needs, when it is first used: a monitor only writes."""
+    """Import what reads on first use, with the simulation that it needs: a monitor only writes."""
     if name not in ("Recording", "read"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from grasp_ros.graph.bag import reading

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import AbstractContextManager
-from heapq import merge
 from itertools import chain, islice, pairwise
 from operator import attrgetter
 from pathlib import Path
@@ -36,23 +35,22 @@ def decoding_bag(path: Path) -> AbstractContextManager[None]:
     return decoding(path, KIND, BagError, UNREADABLE)
 
 
-def open_storage(path: Path, salvage: bool = False) -> Storage:
-    """The storage file of a bag, or of a directory that holds one."""
-    with decoding_bag(path), reading(path, BagError):
-        files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
-        if files and files[0].is_fifo():
-            raise BagError(f"{path}: not {KIND}: a pipe; allowed: a file")
-        if path.name == "metadata.yaml" and path.is_file():
-            raise BagError(f"{path}: the metadata of a bag; the bag is its directory, {path.parent}")
-        if len(files) == 1 and files[0].suffix not in (".db3", PACKED):
-            return Storage(files[0], salvage)
-        if any((path / "bag").glob("*.mcap")):
-            raise BagError(f"{path}: the directory of a run; its bag is {path / 'bag'}")
-        if any(path.glob("*.db3*")) or ".db3" in path.suffixes:
-            raise BagError(f"{path}: its storage is sqlite3; allowed: MCAP, {CONVERT}")
-        if any(path.glob("*.mcap.*")) or path.suffix == PACKED:
-            raise BagError(f"{path}: its file is compressed as a whole; allowed: chunks, {CONVERT}")
-        raise BagError(f"{path}: not {KIND}: holds {len(files)} .mcap files; allowed: one")
+def _file_of(path: Path) -> Path:
+    """The storage file of a bag: the path itself, or the one in a directory."""
+    files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+    if files and files[0].is_fifo():
+        raise BagError(f"{path}: not {KIND}: a pipe; allowed: a file")
+    if path.name == "metadata.yaml" and path.is_file():
+        raise BagError(f"{path}: the metadata of a bag; the bag is its directory, {path.parent}")
+    if len(files) == 1 and files[0].suffix not in (".db3", PACKED):
+        return files[0]
+    if any((path / "bag").glob("*.mcap")):
+        raise BagError(f"{path}: the directory of a run; its bag is {path / 'bag'}")
+    if any(path.glob("*.db3*")) or ".db3" in path.suffixes:
+        raise BagError(f"{path}: its storage is sqlite3; allowed: MCAP, {CONVERT}")
+    if any(path.glob("*.mcap.*")) or path.suffix == PACKED:
+        raise BagError(f"{path}: its file is compressed as a whole; allowed: chunks, {CONVERT}")
+    raise BagError(f"{path}: not {KIND}: holds {len(files)} .mcap files; allowed: one")
 
 
 class Opened:
@@ -64,8 +62,9 @@ class Opened:
     def __init__(self, path: str | os.PathLike[str], salvage: bool = False) -> None:
         self.path = path = given.path("path", path)
         self.salvage = salvage  # what is damaged is left out
-        self.storage = open_storage(path, salvage)
         with decoding_bag(path):
+            with reading(path, BagError):
+                self.storage = Storage(_file_of(path), salvage)
             messages, records = self.storage.messages(), self.storage.records
             first = list(islice(messages, 1))
             if first and OWN_RECORD not in records:
@@ -83,13 +82,9 @@ class Opened:
             self.names = names_of(self.scene, own)
             everything: Iterable[Stored] = chain(first, messages)
             if not self.storage.library.startswith(LIBRARY):
-                again = open_storage(path, salvage).messages()
-                if any(after.time_ns < before.time_ns for before, after in pairwise(again)):
-                    # Topics lie one behind the other, each in its order.
-                    rows = defaultdict[str, list[Stored]](list)
-                    for stored in everything:
-                        rows[stored.topic].append(stored)
-                    everything = merge(*rows.values(), key=attrgetter("time_ns"))
+                again = Storage(self.storage.path, salvage).messages()
+                if any(after.time_ns < before.time_ns for before, after in pairwise(again)):  # topic by topic, say
+                    everything = sorted(everything, key=attrgetter("time_ns"))
             self.foreign: Counter[str] = Counter()  # messages by topic that a bag which is salvaged leaves out
             self.messages = self._known(everything)  # each with its topic
             # Topics whose messages are as they came, not one for each tick: those of commands in a free run.

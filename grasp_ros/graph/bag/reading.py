@@ -1,7 +1,4 @@
-"""Reading bags: rosbag2 directories with MCAP storage, stamped in simulated time.
-
-`recorder` writes them, `storage` knows their records, `recover` makes a new bag of one that is damaged.
-"""
+"""Reading bags: rosbag2 directories with MCAP storage, stamped in simulated time."""
 
 from __future__ import annotations
 
@@ -24,7 +21,6 @@ from grasp_ros.graph.bag.recording import Recording, acted_from
 from grasp_ros.graph.bag.rosbag2 import decode
 from grasp_ros.graph.bag.storage import Storage, Stored
 from grasp_ros.graph.serialization import has_raw_stamp, raw_stamp_ns, template_of
-from grasp_ros.physics import given
 from grasp_ros.physics.layout import OBJECT
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import topics
@@ -47,13 +43,12 @@ def read(path: str | os.PathLike[str]) -> Recording:
     BagError
         If the path is not such a bag, or if it is damaged.
     """
-    path = given.path("path", path)
-    with decoding_bag(path):
-        return _recording(Opened(path))
+    opened = Opened(path)
+    with decoding_bag(opened.path):
+        return _recording(opened)
 
 
 def _recording(opened: Opened) -> Recording:
-    """All that is in a bag."""
     scene, reader, changes, timing = opened.scene, Ticks(opened), Changes(), list[Sequence[float]]()
     quality = () if opened.running.lockstep else timing_names(NAMES[body] for body in scene.system.laws)
     held, own = {topic: array("d") for topic in opened.held}, opened.storage.records[OWN_RECORD]
@@ -65,7 +60,7 @@ def _recording(opened: Opened) -> Recording:
             if topic in topics.CHANGES.values():
                 changes.add(topic, scene, stored)
             elif topic == topics.TIMING:
-                timing.extend(_of_a_plant(quality, stored))
+                timing.extend(_timing(quality, stored))
             elif topic in held:  # a command of a free run, which belongs to no tick
                 held[topic].append(reader.numbers(topic, stored.cdr)[-1])
                 if not abs(held[topic][-1]) <= LARGEST:
@@ -197,7 +192,7 @@ class Ticks:
         return self._templates[topic].read(cdr) or self._decoded(topic, cdr)
 
     def _decoded(self, topic: Topic, cdr: bytes) -> list[float]:
-        """Time and numbers of a message of another make, in the order of those of a recorder."""
+        """Time and numbers of a message of another program, in the order of those of a recorder."""
         message, names, name = decode(topic, cdr), self.names, self._full[topic]
         if topic == topics.CLOCK:
             return [message.clock.sec, message.clock.nanosec]
@@ -245,16 +240,16 @@ class Changes(dict[int, dict[str, float]]):
             self._now.update(new)
 
 
-def _of_a_plant(known: Sequence[str], stored: Stored) -> Iterator[Sequence[float]]:
-    """The numbers of a message on `timing`, unless somebody else has sent it: anybody may."""
+def _timing(names: Sequence[str], stored: Stored) -> Iterator[Sequence[float]]:
+    """The numbers of a message on `timing`; none of one that is not a plant's: any node may publish there."""
     with suppress(*UNREADABLE):
         message = decode(topics.TIMING, stored.cdr)
-        if [*known] == message.name and len(known) == len(message.position) and np.isfinite(message.position).all():
+        if [*names] == message.name and len(names) == len(message.position) and np.isfinite(message.position).all():
             yield message.position
 
 
 def _lost(storage: Storage) -> dict[str, str]:
-    """What the bag says about its end; in place of a word that it does not have, what its reader has seen."""
+    """How the recording ended and what is missing, as the bag says it; without its word, what the reader has found."""
     if not storage.closed:
         left_out = sum(size for _, size, _ in storage.left_out)
         return {"end": f"not closed; {left_out} bytes behind the last whole chunk are left out"}

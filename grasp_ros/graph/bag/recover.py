@@ -13,7 +13,7 @@ from grasp_ros.graph.bag.reading import Changes, Ticks, ticks_of
 from grasp_ros.graph.bag.recorder import Recorder
 from grasp_ros.scene.topics import CHANGES, CLOCK, LYAPUNOV, RUN, SCENE
 
-MOST_REASONS = 20  # that are told apart
+MOST_REASONS = 20  # that are listed
 TICK = re.compile(r"\b(tick \d+: |\d+ ns; )")  # which is noted beside the reason
 
 
