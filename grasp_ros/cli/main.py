@@ -46,7 +46,7 @@ def grasp() -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run what the command line, or the arguments, say; returns the exit status."""
     if "_ARGCOMPLETE" in os.environ:
-        complete(_parser)
+        _complete()
     words = sys.argv[1:] if arguments is None else arguments
     return run(lambda: _parser(words), words)
 
@@ -96,8 +96,9 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
         command: Command = options.command
         if isinstance(sys.stdout, io.TextIOWrapper):  # a title or a path that the terminal cannot show is no error
             sys.stdout.reconfigure(errors="backslashreplace")
-        if hasattr(options, "quiet"):
-            import_module("grasp_ros.cli.output").set_level(options)
+        from grasp_ros.cli.output import set_level  # with numpy, which a help does not need
+
+        set_level(options)
         with needing("this"):
             status = command(options)
         stop_if_signalled()
@@ -128,13 +129,13 @@ def _check_directory() -> None:
         raise Refused("the working directory is gone; allowed: one that is there") from None
 
 
-def complete(parser: Callable[[Sequence[str]], argparse.ArgumentParser]) -> None:
+def _complete() -> None:
     """Answer a shell that completes a command line, and end."""
     import argcomplete
 
     line = os.environ.get("COMP_LINE", "")[: int(os.environ.get("COMP_POINT", "0"))].split(" ")
     words = line[1:-1]  # the last one is not complete yet
-    argcomplete.autocomplete(parser(words))
+    argcomplete.autocomplete(_parser(words))
 
 
 def _say_more(seconds: float) -> None:

@@ -24,16 +24,16 @@ if TYPE_CHECKING:
     from grasp_ros.simulation.progress import Told
 
 STDOUT = Path("-")
-LOG = logging.getLogger("grasp_ros")  # whose level says how much is said beside the results
+LOG = logging.getLogger("grasp_ros")  # whose level decides whether there are notes and progress bars
 
 
 def set_level(options: argparse.Namespace) -> None:
-    """How much a command says beside its results."""
+    """Set whether a command prints notes beside its results."""
     LOG.setLevel(logging.ERROR if getattr(options, "quiet", False) else logging.WARNING)
 
 
 def note(text: str) -> None:
-    """Say something beside the results, unless nobody wants to hear it."""
+    """Print a note to the standard error output, unless the command is quiet."""
     if LOG.isEnabledFor(logging.WARNING):
         print(text, file=sys.stderr)
 

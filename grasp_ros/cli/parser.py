@@ -49,7 +49,7 @@ class Parser(argparse.ArgumentParser):
                 super()._print_message(message, file)
 
     def parse_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
-        """Arguments; what nobody knows is an error of the command, and not of `grasp`."""
+        """Arguments; one that is unknown is an error of the command, and not of `grasp`."""
         options, rest = self.parse_known_args(args, namespace)
         if rest:
             parser: argparse.ArgumentParser = getattr(options, "parser", self)
