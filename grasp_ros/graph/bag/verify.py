@@ -69,28 +69,18 @@ class Verification(NamedTuple):
 
 def verify(recording: Recording) -> Verification:
     """Simulate the scene of a bag with its recorded inputs, and compare every number that follows from them."""
-    ticks, first = 0, None
+    ticks, difference = 0, None
     lost = _lost(check_recording(recording))
     problem = _gap(recording, lost)
     for rows in _episodes(recording):
         states, stop = _simulate(recording, rows)
         ticks += len(states)
         problem = problem or stop
-        part, found = rows[: len(states)], []
-        for topic, name, *pair in _columns(recording, part, states):
-            recorded, computed = (np.ascontiguousarray(numbers, dtype=float) for numbers in pair)
-            same = (recorded.view(np.int64) == computed.view(np.int64)) | (np.isnan(recorded) & np.isnan(computed))
-            if topic in lost:  # which `_gap` names
-                same |= lost[topic][part]
-            if not same.all():
-                at = int(np.argmin(same))
-                tick = int(recording.tick[part[at]])
-                found.append(Difference(tick, topic, name, float(recorded[at]), float(computed[at])))
-        if found:
-            first = min(found, key=lambda difference: difference.tick)
+        difference = _first_difference(recording, rows[: len(states)], states, lost)
+        if difference is not None:
             break
     answers = answers_of(recording)
-    return Verification(ticks, first, problem, answers, _same_without_ros(recording, answers))
+    return Verification(ticks, difference, problem, answers, _same_without_ros(recording, answers))
 
 
 class Answers(NamedTuple):
@@ -204,6 +194,23 @@ def _simulate(recording: Recording, rows: np.ndarray) -> tuple[Array, str]:
     if plant.status is not Status.DONE:
         return states, plant.stop
     return np.concatenate([states, plant.state[None]]), ""
+
+
+def _first_difference(
+    recording: Recording, rows: np.ndarray, states: Array, lost: Mapping[str, np.ndarray]
+) -> Difference | None:
+    """The first number of an episode that does not follow from its inputs; not of messages that are lost."""
+    found = []
+    for topic, name, *pair in _columns(recording, rows, states):
+        recorded, computed = (np.ascontiguousarray(numbers, dtype=float) for numbers in pair)
+        same = (recorded.view(np.int64) == computed.view(np.int64)) | (np.isnan(recorded) & np.isnan(computed))
+        if topic in lost:  # which `_gap` names
+            same |= lost[topic][rows]
+        if not same.all():
+            at = int(np.argmin(same))
+            tick = int(recording.tick[rows[at]])
+            found.append(Difference(tick, topic, name, float(recorded[at]), float(computed[at])))
+    return min(found, key=lambda difference: difference.tick, default=None)
 
 
 def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[tuple[str, str, Array, Array]]:
