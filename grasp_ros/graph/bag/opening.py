@@ -15,7 +15,7 @@ from rosbags.serde import SerdeError
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
 from grasp_ros.graph.bag import BagError, EmptyBagError
-from grasp_ros.graph.bag.recorder import LIBRARY, OWN_RECORD, VERSION
+from grasp_ros.graph.bag.recorder import OWN_RECORD, VERSION
 from grasp_ros.graph.bag.rosbag2 import TOPIC, decode, names_of, topics_of
 from grasp_ros.graph.bag.storage import CONVERT, Storage, Stored
 from grasp_ros.physics import given
@@ -71,7 +71,7 @@ class Opened:
                 first += islice(messages, MOST_AHEAD)
                 if any(stored.cdr.startswith(ZSTD) for stored in first):
                     raise BagError(f"{path}: its messages are compressed one by one; allowed: chunks, {CONVERT}")
-                records[OWN_RECORD] = _said(first, path)
+                records[OWN_RECORD] = _record_from_topics(first, path)
             if OWN_RECORD not in records:
                 why = "".join(f": {why}" for _, _, why in self.storage.left_out[:1])
                 raise EmptyBagError(f"{path}: holds no tick{why}")
@@ -81,7 +81,7 @@ class Opened:
             self.versions = {key.removeprefix(VERSION): word for key, word in own.items() if key.startswith(VERSION)}
             self.names = names_of(self.scene, own)
             everything: Iterable[Stored] = chain(first, messages)
-            if not self.storage.library.startswith(LIBRARY):
+            if not self.storage.ours:
                 again = Storage(self.storage.path, salvage).messages()
                 if any(after.time_ns < before.time_ns for before, after in pairwise(again)):  # topic by topic, say
                     everything = sorted(everything, key=attrgetter("time_ns"))
@@ -103,8 +103,8 @@ class Opened:
                                    " `grasp recover` leaves it out")
 
 
-def _said(first: Collection[Stored], path: Path) -> dict[str, str]:
-    """What the topics of a bag say of it, as its own record would."""
+def _record_from_topics(first: Collection[Stored], path: Path) -> dict[str, str]:
+    """The own record of a bag that has lost it, from the topics `scene` and `run`, and the names of all topics."""
     there = {stored.topic.rpartition("/")[2]: stored for stored in first if stored.type == SCENE.type}
     if not {SCENE.name, RUN.name} <= there.keys():
         missing = " and ".join(topic.name for topic in (SCENE, RUN) if topic.name not in there)

@@ -8,6 +8,7 @@ from array import array
 from collections import Counter
 from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import suppress
+from itertools import groupby
 from pathlib import Path
 from typing import NoReturn
 
@@ -16,12 +17,13 @@ import numpy as np
 from grasp_ros import scene as scenes
 from grasp_ros.graph.bag import BagError, EmptyBagError
 from grasp_ros.graph.bag.opening import UNREADABLE, Opened, decoding_bag
-from grasp_ros.graph.bag.recorder import BESIDE, LIBRARY, LOST_RECORD, OWN_RECORD, checksum
+from grasp_ros.graph.bag.recorder import LOST_RECORD, METADATA_DIGEST, OWN_RECORD, checksum
 from grasp_ros.graph.bag.recording import Recording, acted_from
 from grasp_ros.graph.bag.rosbag2 import decode
 from grasp_ros.graph.bag.storage import Storage, Stored
 from grasp_ros.graph.serialization import has_raw_stamp, raw_stamp_ns, template_of
 from grasp_ros.physics.layout import OBJECT
+from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import topics
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -49,16 +51,16 @@ def read(path: str | os.PathLike[str]) -> Recording:
 
 
 def _recording(opened: Opened) -> Recording:
-    scene, reader, changes, timing = opened.scene, Ticks(opened), Changes(), list[Sequence[float]]()
+    scene, reader, changes, timing = opened.scene, Ticks(opened), Changes(opened.scene), list[Sequence[float]]()
     quality = () if opened.running.lockstep else timing_names(NAMES[body] for body in scene.system.laws)
     held, own = {topic: array("d") for topic in opened.held}, opened.storage.records[OWN_RECORD]
     counts = Counter(dict.fromkeys(opened.names, 0))
     stamps, rows = array("q"), array("d")
-    for time_ns, tick, beside in ticks_of(opened, reader.topics):
-        counts.update([*tick, *(topic for topic, _ in beside)])
-        for topic, stored in beside:
+    for time_ns, tick, others in ticks_of(opened, reader.topics):
+        counts.update([*tick, *(topic for topic, _ in others)])
+        for topic, stored in others:
             if topic in topics.CHANGES.values():
-                changes.add(topic, scene, stored)
+                changes.add(topic, stored)
             elif topic == topics.TIMING:
                 timing.extend(_timing(quality, stored))
             elif topic in held:  # a command of a free run, which belongs to no tick
@@ -75,52 +77,70 @@ def _recording(opened: Opened) -> Recording:
         raise EmptyBagError(f"{opened.path}: holds no tick")
     _check_metadata(opened.path, opened.storage)
     times = np.array(stamps).reshape(-1, 2)
+    ticks = times[:, 0] // scene.period_ns
     ends = np.cumsum([template.count for template in reader.topics.values()])[:-1]
     parts = dict(zip(reader.topics, np.split(np.array(rows).reshape(len(times), -1), ends, axis=1), strict=True))
-    ticks, states, lyapunov = times[:, 0] // scene.period_ns, parts[topics.JOINT_STATES], parts[topics.LYAPUNOV]
+    state, effort, command = _motion(scene, ticks, parts)
+    return Recording(
+        path=opened.path, scene=scene, versions=opened.versions, running=opened.running, tick=ticks, state=state,
+        effort=effort, command=command, outputs={own.topic.name: parts[own.topic][:, 0] for own in scene.outputs},
+        lyapunov=parts[topics.LYAPUNOV], changes=dict(changes), starts=ticks[times[:, 1] == 0],
+        counts={topic.name: count for topic, count in counts.items()}, unheard=dict(+changes.unheard),
+        timing=dict(zip(quality, np.array(timing).T, strict=True)) if timing else {}, lost=_lost(opened.storage),
+        held={side: np.array(held[topic]) for side, topic in topics.COMMANDS.items() if topic in held},
+    )
+
+
+def _motion(scene: scenes.Scene, ticks: np.ndarray, parts: Mapping[Topic, Array]) -> tuple[Array, Array, Array]:
+    """State, effort and command of a `Recording` from the numbers (n, ...) of each topic."""
     state, effort, command = np.full((len(ticks), 6), np.nan), *np.zeros((2, len(ticks), 2))
-    for body, numbers in zip(scene.system.present, states.reshape(len(ticks), 3, -1).T, strict=True):
+    of_bodies = parts[topics.JOINT_STATES].reshape(len(ticks), 3, -1)
+    for body, numbers in zip(scene.system.present, of_bodies.T, strict=True):
         state[:, COLUMN[body]], state[:, COLUMN[body] + 1] = numbers[:2]
         if body != OBJECT:
             effort[:, body] = numbers[2]
     for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
         command[:, side] = parts[topic][:, 0] if topic in parts else acted_from(ticks, effort[:, side])
-    return Recording(
-        opened.path, scene, opened.versions, {topic.name: count for topic, count in counts.items()}, ticks, state,
-        effort, command, {output.topic.name: parts[output.topic][:, 0] for output in scene.outputs}, lyapunov,
-        dict(changes), opened.running, ticks[times[:, 1] == 0], _lost(opened.storage),
-        dict(zip(quality, np.array(timing).T, strict=True)) if timing else {}, dict(+changes.unheard),
-        {side: np.array(held[topic]) for side, topic in topics.COMMANDS.items() if topic in held},
-    )
+    return state, effort, command
 
 
 def ticks_of(
     opened: Opened, wanted: Container[Topic]
 ) -> Iterator[tuple[int, dict[Topic, bytes], list[tuple[Topic, Stored]]]]:
-    """Time in ns of each tick, its messages on these topics, and what lies beside them, in the order of the bag.
+    """Time in ns of each tick, its messages on these topics, and all others of that time, in the order of the bag.
 
-    A topic has one message for a tick; of more the last one is salvaged. In a bag that another program has written,
-    times that are not the stamps are refused; until a reset, from which on our own are ahead of them.
+    A topic has one message for a tick; of more the last one is salvaged.
     """
-    time_ns, tick, beside = 0, dict[Topic, bytes](), list[tuple[Topic, Stored]]()
-    theirs, stamp_ns = not opened.storage.library.startswith(LIBRARY), 0
-    for topic, stored in opened.messages:
-        if theirs and topic in wanted and has_raw_stamp(stored.cdr):
-            before_ns, stamp_ns = stamp_ns, raw_stamp_ns(stored.cdr)
-            if before_ns <= stamp_ns != stored.time_ns:
-                raise BagError(f"{opened.path}: {stored.topic}: time {stored.time_ns} ns in the bag, stamp {stamp_ns}"
-                               f" ns: another recorder wrote it; {OUR_TIMES}")
-            theirs = before_ns <= stamp_ns
-        if stored.time_ns != time_ns:
-            yield time_ns, tick, beside
-            time_ns, tick, beside = stored.time_ns, {}, []
-        if topic in wanted:
+    messages = opened.messages if opened.storage.ours else _with_our_times(opened, wanted)
+    for time_ns, group in groupby(messages, key=lambda message: message[1].time_ns):
+        tick, others = dict[Topic, bytes](), list[tuple[Topic, Stored]]()
+        for topic, stored in group:
+            if topic not in wanted:
+                others.append((topic, stored))
+                continue
             if topic in tick and not opened.salvage:
                 raise BagError(f"{stored.topic}: {time_ns} ns; {IN_ORDER}")
             tick[topic] = stored.cdr
-        else:
-            beside.append((topic, stored))
-    yield time_ns, tick, beside
+        yield time_ns, tick, others
+
+
+def _with_our_times(opened: Opened, wanted: Container[Topic]) -> Iterator[tuple[Topic, Stored]]:
+    """Messages of a bag that another program has written; refused if their times are not the stamps.
+
+    Until a reset, from which on the times of our own bags are ahead of the stamps.
+    """
+    stamp_ns = 0
+    for topic, stored in opened.messages:
+        if topic in wanted and has_raw_stamp(stored.cdr):
+            before_ns, stamp_ns = stamp_ns, raw_stamp_ns(stored.cdr)
+            if stamp_ns < before_ns:
+                yield topic, stored
+                break
+            if stamp_ns != stored.time_ns:
+                raise BagError(f"{opened.path}: {stored.topic}: time {stored.time_ns} ns in the bag, stamp {stamp_ns}"
+                               f" ns: another recorder wrote it; {OUR_TIMES}")
+        yield topic, stored
+    yield from opened.messages
 
 
 def _check_metadata(path: Path, storage: Storage) -> None:
@@ -129,7 +149,7 @@ def _check_metadata(path: Path, storage: Storage) -> None:
     there = storage.closed and LOST_RECORD in storage.records and path.is_dir() and file.exists()
     if there and not file.is_file():
         raise BagError(f"{file}: not a file")
-    if there and checksum(read_text(file, BagError)) != storage.records[LOST_RECORD][BESIDE]:
+    if there and checksum(read_text(file, BagError)) != storage.records[LOST_RECORD][METADATA_DIGEST]:
         raise BagError(f"{file}: was changed; `grasp recover` makes a new bag with metadata of its own")
 
 
@@ -164,7 +184,7 @@ class Ticks:
             if (cdr := tick.get(topic)) is None:
                 row += [math.nan] * template.count
                 continue
-            found[topic] = numbers = template.read(cdr) or self._decoded(topic, cdr)
+            found[topic] = numbers = self.numbers(topic, cdr)
             row += numbers[2:]
             if topic != topics.LYAPUNOV and not sum(map(abs, numbers)) <= LARGEST:
                 self._refuse(topic, time_ns, NOT_FINITE)
@@ -219,23 +239,22 @@ class Ticks:
 class Changes(dict[int, dict[str, float]]):
     """Numbers that differ from those in force before, by the tick of the bag from which they act."""
 
-    def __init__(self) -> None:
-        self._now: dict[str, float] = {}
+    def __init__(self, scene: scenes.Scene) -> None:
+        self._period_ns = scene.period_ns
+        self._now = {name: number for node in scene.controllers for name, number in scene.numbers_of(node).items()}
         self._numbers = {topic: Numbers() for topic in topics.CHANGES.values()}
         self.unheard: Counter[str] = Counter()
 
-    def add(self, topic: Topic, scene: scenes.Scene, stored: Stored) -> None:
+    def add(self, topic: Topic, stored: Stored) -> None:
         """Take an announcement."""
-        message, tick = decode(topic, stored.cdr), stored.time_ns // scene.period_ns
+        message, tick = decode(topic, stored.cdr), stored.time_ns // self._period_ns
         if len(message.name) != len(message.position):
             raise BagError(f"{stored.topic}: tick {tick}: {len(message.name)} names of {len(message.position)} numbers")
         numbers = dict(zip(message.name, message.position.tolist(), strict=True))
         self.unheard[topic.name] += self._numbers[topic].take(message)
-        known = {name: number for node in scene.controllers for name, number in scene.numbers_of(node).items()}
-        if not numbers.keys() <= known.keys():
-            raise BagError(f"{stored.topic}: {numbers} at tick {tick}; allowed: {', '.join(known)}")
-        now = {**known, **self._now}
-        if new := {name: number for name, number in numbers.items() if now[name] != number}:
+        if not numbers.keys() <= self._now.keys():
+            raise BagError(f"{stored.topic}: {numbers} at tick {tick}; allowed: {', '.join(self._now)}")
+        if new := {name: number for name, number in numbers.items() if self._now[name] != number}:
             self.setdefault(tick, {}).update(new)
             self._now.update(new)
 
@@ -254,4 +273,4 @@ def _lost(storage: Storage) -> dict[str, str]:
         left_out = sum(size for _, size, _ in storage.left_out)
         return {"end": f"not closed; {left_out} bytes behind the last whole chunk are left out"}
     anew = {"end": "written anew by another program, which does not say what was lost"}
-    return {key: word for key, word in storage.records.get(LOST_RECORD, anew).items() if key != BESIDE}
+    return {key: word for key, word in storage.records.get(LOST_RECORD, anew).items() if key != METADATA_DIGEST}

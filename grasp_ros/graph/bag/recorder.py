@@ -40,10 +40,10 @@ HEAD: struct.Struct = struct.Struct("<BQ")  # opcode and length of every record 
 MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # the same of a message, its channel, number and both times
 OWN_RECORD, LOST_RECORD = "grasp_ros", "grasp_ros/lost"
 LIBRARY = "grasp_ros-"  # how the name of what has written a bag begins
-# Counted in LOST_RECORD: all that is in the bag, and what came beside the states and was too much.
+# Counted in LOST_RECORD: all that is in the bag, and what came between the states and was too much.
 WRITTEN, NOT_RECORDED = "messages written", "messages not recorded"
 VERSION = "version "  # how the keys of versions begin
-DIGEST, BESIDE = "digest", "digest of metadata.yaml"  # keys of checksums in these records
+DIGEST, METADATA_DIGEST = "digest", "digest of metadata.yaml"  # keys of checksums in these records
 
 
 def checksum(text: str) -> str:
@@ -220,14 +220,14 @@ class Recorder:
                 with writing(self._path, BagError):
                     with self._lock:
                         self._flush()
-                    self._see_whether_there()
+                    self._check_file()
                     os.fdatasync(self._sink.file)
             except BagError as error:  # for whoever writes or closes next
                 self._error, self._closed = str(error), True
                 return
 
-    def _see_whether_there(self) -> None:
-        """Nobody has taken the file away or cut it off: its end would be written where it is not."""
+    def _check_file(self) -> None:
+        """Refuse a file that was deleted, moved or cut off: its end could not be written behind it."""
         self._sink.check()
         file = os.fstat(self._sink.file)
         if not file.st_nlink:
@@ -271,7 +271,7 @@ class Recorder:
         document = rosbag2.metadata(f"{self._path.name}.mcap", counts, self._names, self._last_ns, self._custom)
         text = dump(document)
         lost = {"end": why, "ticks that are missing": self.gaps or "none", WRITTEN: str(sum(counts.values())),
-                **counters, BESIDE: checksum(text)}
+                **counters, METADATA_DIGEST: checksum(text)}
         self._writer.add_metadata(LOST_RECORD, signed(lost))
         self._writer.add_metadata(rosbag2.METADATA_RECORD, {
             rosbag2.METADATA_KEY: dump(document[rosbag2.INFORMATION]).strip()

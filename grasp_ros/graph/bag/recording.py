@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate, pairwise
 from pathlib import Path
@@ -83,10 +83,10 @@ class Recording(Tabular, Frozen):
     changes: dict[int, dict[str, float]]
     running: Running
     starts: np.ndarray
-    lost: dict[str, str] = field(default_factory=dict)
-    timing: dict[str, Array] = field(default_factory=dict)
-    unheard: dict[str, int] = field(default_factory=dict)
-    held: dict[str, Array] = field(default_factory=dict)
+    lost: dict[str, str]
+    timing: dict[str, Array]
+    unheard: dict[str, int]
+    held: dict[str, Array]
 
     @cached_property
     def t(self) -> Array:

@@ -11,7 +11,7 @@ from grasp_ros.graph.bag import BagError
 from grasp_ros.graph.bag.opening import UNREADABLE, Opened
 from grasp_ros.graph.bag.reading import Changes, Ticks, ticks_of
 from grasp_ros.graph.bag.recorder import Recorder
-from grasp_ros.scene.topics import CHANGES, CLOCK, LYAPUNOV, RUN, SCENE
+from grasp_ros.scene.topics import CHANGES, CLOCK, RUN, SCENE
 
 MOST_REASONS = 20  # that are listed
 TICK = re.compile(r"\b(tick \d+: |\d+ ns; )")  # which is noted beside the reason
@@ -34,7 +34,7 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
         If nothing can be saved, or if the new bag cannot be written.
     """
     opened, refused, written = Opened(path, salvage=True), dict[str, list[int]](), 0
-    scene, reader, changes, recorder = opened.scene, Ticks(opened), Changes(), None
+    scene, reader, changes, recorder = opened.scene, Ticks(opened), Changes(opened.scene), None
     wanted = {*reader.topics} - {CLOCK}
 
     def note(error: Exception, tick: int) -> None:
@@ -44,9 +44,7 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
 
     try:
         for time_ns, tick, others in ticks_of(opened, wanted):
-            if not (tick or others):
-                continue
-            number, beside = time_ns // scene.period_ns, []
+            number = time_ns // scene.period_ns
             try:
                 if missing := sorted(topic.name for topic in wanted - tick.keys()):
                     raise BagError(f"no message on {', '.join(missing)}")
@@ -54,21 +52,19 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
             except UNREADABLE as error:
                 note(error, number)
                 continue
-            for topic, stored in others:
-                try:
-                    if topic in CHANGES.values():
-                        changes.add(topic, scene, stored)
-                        tick[topic] = stored.cdr
-                    elif topic not in (SCENE, RUN, CLOCK):  # these three the recorder writes itself
-                        beside.append((topic, stored.cdr))
-                except UNREADABLE as error:
-                    note(error, number)
-            tick[LYAPUNOV] = tick.pop(LYAPUNOV)  # the last one
             recorder = recorder or Recorder(Path(new), scene, opened.versions, opened.names, opened.running)
             recorder.write_tick(time_ns, tick.items(), reader.stamp_ns)
-            for topic, cdr in beside:
-                recorder.write(topic, cdr)
             written += 1
+            for topic, stored in others:
+                if topic in (SCENE, RUN, CLOCK):  # which the recorder writes itself
+                    continue
+                try:
+                    if topic in CHANGES.values():
+                        changes.add(topic, stored)
+                except UNREADABLE as error:
+                    note(error, number)
+                    continue
+                recorder.write(topic, stored.cdr)
     finally:
         left_out = [f"{size} bytes from byte {offset} on: {why}" for offset, size, why in opened.storage.left_out]
         left_out += [f"messages on {name}, no topic of its scene: {count}" for name, count in opened.foreign.items()]

@@ -22,7 +22,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Footer, Header, Metadata, Schema
 
 from grasp_ros.graph.bag import BagError
-from grasp_ros.graph.bag.recorder import DIGEST, HEAD, LOST_RECORD, OWN_RECORD, signed
+from grasp_ros.graph.bag.recorder import DIGEST, HEAD, LIBRARY, LOST_RECORD, OWN_RECORD, signed
 from grasp_ros.graph.bag.rosbag2 import PROFILE
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -38,8 +38,8 @@ CONVERT = "as `rosbags-convert --src BAG --dst NEW --dst-storage mcap` writes it
 DAMAGE = (McapError, zstandard.ZstdError, struct.error, UnicodeDecodeError, EOFError, OverflowError)
 
 
-class AnotherMakeError(McapError):
-    """What is not damaged, but was written in another way."""
+class UnsupportedFormatError(McapError):
+    """A valid record that no bag of this package has."""
 
 
 class Stored(NamedTuple):
@@ -62,7 +62,7 @@ class Storage:
         # Both are complete when all messages have been taken.
         self.left_out: list[tuple[int, int, str]] = []  # offset, size and reason of what was not read
         self.records: dict[str, dict[str, str]] = {}  # of metadata, by name
-        self.library = ""  # which has written it
+        self.ours = False  # whether this package has written it
         self._channels: dict[int, Channel] = {}
         self._schemas: dict[int, Schema] = {}
         with path.open("rb") as file:
@@ -89,7 +89,7 @@ class Storage:
                 yield from self._read(opcode, body)
                 offset = end
             except DAMAGE as error:
-                if isinstance(error, AnotherMakeError) and not self._salvage:
+                if isinstance(error, UnsupportedFormatError) and not self._salvage:
                     raise BagError(f"{self.path}: {error}, {CONVERT}") from None
                 offset = self._behind_damage(offset, " ".join(str(error).split()) or type(error).__name__)
         if self.closed and not self._salvage:
@@ -109,21 +109,21 @@ class Storage:
             self._refuse("the end of its data is not as long as it should be")
 
     def _end_of(self, offset: int) -> int:
-        """Where a record ends, if it is all there. A longer one than any of a bag is an AnotherMakeError."""
+        """Where a record ends, if it is all there."""
         begin = end = offset + HEAD.size
         if begin <= len(self._data):
             end += HEAD.unpack_from(self._data, offset)[1]
         if end > len(self._data):
             raise EOFError("the rest of a record is missing")
         if (length := end - begin) > RECORD_BYTES:
-            raise AnotherMakeError(f"a record of {length} bytes; allowed: at most {RECORD_BYTES}")
+            raise UnsupportedFormatError(f"a record of {length} bytes; allowed: at most {RECORD_BYTES}")
         return end
 
     def _read(self, opcode: int, body: bytes) -> Iterator[Stored]:
         stream = ReadDataStream(BytesIO(body))
         if opcode == Opcode.HEADER:
             header = Header.read(stream)
-            self.library = header.library
+            self.ours = header.library.startswith(LIBRARY)
             if header.profile != PROFILE:
                 raise BagError(f"{self.path}: not a bag of this package: no file of ROS 2")
         elif opcode == Opcode.METADATA:
@@ -138,7 +138,7 @@ class Storage:
             if len(body) != 6 + stream.read4():
                 raise McapError("an index that is not as long as it claims")
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
-            raise AnotherMakeError("its messages are not in chunks; allowed: chunks")
+            raise UnsupportedFormatError("its messages are not in chunks; allowed: chunks")
         elif opcode != Opcode.ATTACHMENT:
             raise McapError(f"record {opcode} is not one of a bag")
 
@@ -237,7 +237,7 @@ def unpack(body: bytes) -> bytes:
     elif chunk.compression == "":
         data = chunk.data
     else:
-        raise AnotherMakeError(f"its chunks have the compression {chunk.compression!r}; allowed: zstd, or none")
+        raise UnsupportedFormatError(f"its chunks have the compression {chunk.compression!r}; allowed: zstd, or none")
     if len(data) != chunk.uncompressed_size:
         raise McapError("a chunk is not as long as it claims")
     if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
