@@ -21,7 +21,7 @@ from grasp_ros.scene.files import replacing
 
 if TYPE_CHECKING:
     from grasp_ros.scene import Scene
-    from grasp_ros.simulation.progress import Told
+    from grasp_ros.simulation.progress import Callback
 
 STDOUT = Path("-")
 LOG = logging.getLogger("grasp_ros")  # whose level decides whether there are notes and progress bars
@@ -38,7 +38,7 @@ def note(text: str) -> None:
         print(text, file=sys.stderr)
 
 
-def bar(total: float | None, unit: str, name: str) -> AbstractContextManager[Told | None]:
+def bar(total: float | None, unit: str, name: str) -> AbstractContextManager[Callback | None]:
     """A bar on a terminal, see `simulation.progress`; None where there is none."""
     from grasp_ros.simulation.progress import showing  # with the compiler, which a graph does not need
 

@@ -27,7 +27,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.simulation.chunk import Setup, check
 from grasp_ros.simulation.ensemble import ensemble
 from grasp_ros.simulation.outcomes import GROUPS, find, wanted_by
-from grasp_ros.simulation.progress import Told, showing
+from grasp_ros.simulation.progress import Callback, showing
 
 MEMBERS, GENERATIONS = 16, 500  # members of a population for each free number; generations at most
 AGREE = 1e-14  # standard deviation of what a population reaches, relative, at which a search ends
@@ -128,7 +128,7 @@ class Design(Frozen):
 
 def design(
     scene: Scene, free: Mapping[str, tuple[float, float]], minimise: str, subject_to: Mapping[str, float] | None = None,
-    *, setup: Setup | None = None, seed: int = 0, progress: Told | bool | None = None,
+    *, setup: Setup | None = None, seed: int = 0, progress: Callback | bool | None = None,
 ) -> Design:
     """Choose numbers of a scene so that an outcome is small.
 
@@ -167,7 +167,7 @@ def design(
         return search(problem, seed, told)
 
 
-def search(problem: DesignProblem, seed: int = 0, progress: Told | None = None) -> Design:
+def search(problem: DesignProblem, seed: int = 0, progress: Callback | None = None) -> Design:
     """Find the choice whose first outcome is smallest within the bounds.
 
     Where the best choice is unique every seed ends there. `progress` is told the number of simulations so far. Refused:
@@ -227,7 +227,7 @@ def search(problem: DesignProblem, seed: int = 0, progress: Told | None = None) 
     return Design(problem.scene.changed(numbers), numbers, outcomes, runs)
 
 
-def front(problem: DesignProblem, seed: int = 0, progress: Told | None = None) -> list[Design]:
+def front(problem: DesignProblem, seed: int = 0, progress: Callback | None = None) -> list[Design]:
     """The Pareto front of the two outcomes of a problem, from the first outcome's best on.
 
     Each has the smallest first outcome for a bound on the second one; the bounds are even between the two ends. One

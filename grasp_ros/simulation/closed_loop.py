@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from heapq import merge
 from itertools import groupby, islice
 from types import MappingProxyType
@@ -28,9 +28,9 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.own_law import begin
-from grasp_ros.simulation.sampled_plant import LoopRecord, Outputs, SampledPlant, new_loop
+from grasp_ros.simulation.progress import Callback
+from grasp_ros.simulation.sampled_plant import LoopRecord, Outputs, SampledPlant
 
-Progress = Callable[[float], object] | None
 PATIENCE = 0.1  # s that a block of ticks may take
 SHORTEST, LONGEST = 16, 8192  # ticks of the first block, and of any
 Changes = Mapping[int, Mapping[str, float]]
@@ -72,37 +72,35 @@ def check_changes(scene: Scene, held: bool, changes: Changes, by_user: Iterable[
 
 
 def drive_sampled(
-    scene: Scene, grid: Array, loop: LoopRecord, changes: Changes, by_user: Mapping[int, UserController],
-    progress: Progress, integrator: Integrator,
-) -> Array:
-    """States (n, 6) under controllers that answer at every tick; only the rows reached, if the integrator stops.
+    scene: Scene, integrator: Integrator, grid: Array, changes: Changes = NO_CHANGES,
+    by_user: Mapping[int, UserController] = NO_USER_CONTROLLERS, progress: Callback | None = None,
+) -> tuple[Array, LoopRecord]:
+    """States (n, 6) under controllers that answer at every tick, and what went through the loop.
 
-    `loop` is filled with what was answered and what acted, at the output times that are reached. `changes` are numbers
-    of the controllers that are set while it runs, by the tick from which they act.
+    Only the rows reached, if the integrator stops. `changes` are numbers of the controllers that are set while it runs,
+    by the tick from which they act.
     """
-    plant, states, done = SampledPlant(scene.system, scene.period_ns, integrator), np.empty((len(grid), 6)), 0
+    plant, n, done = SampledPlant(scene.system, scene.period_ns, integrator), len(grid), 0
+    states, command, inputs = np.empty((n, 6)), np.empty((n, 2)), np.full((n, 3), np.nan)
     for ticks in _blocks(scene.ticks, changes):
         if plant.tick in changes:
             scene = scene.changed(changes[plant.tick])
         # a user's controller has the sensor and the actuator of the scene
         laws = {**{side: ControlLaw() for side in by_user}, **scene.system.laws}
-        outputs, interval = outputs_within(grid, ticks, scene.period_ns)
-        record = plant.run(laws, outputs, by_user, states[done : done + len(interval)])
-        at_end = len(ticks) == 1  # the output times of the last tick and later: nothing acts there
-        if at_end:
-            states[done:], interval = plant.state, np.zeros(len(grid) - done, dtype=np.int64)
-        else:
-            interval = interval[: len(record.states)]
+        outputs = outputs_within(grid, ticks, scene.period_ns)
+        record = plant.run(laws, outputs, by_user, states[done : done + len(outputs.offsets)])
+        if len(ticks) == 1:  # the output times of the last tick and later: nothing acts there
+            states[done:], command[done:], done = plant.state, record.answers[0, :OBJECT], n
+            break
+        interval = outputs.interval[: len(record.states)]
         rows = slice(done, done + len(interval))
-        loop.command[rows] = record.answers[interval, :OBJECT]
-        if len(record.inputs):
-            loop.inputs[rows] = record.inputs[interval]
+        command[rows], inputs[rows] = record.answers[interval, :OBJECT], record.inputs[interval]
         done = rows.stop
         if plant.status is not Status.DONE:
             break
-        if progress is not None and not at_end:
+        if progress is not None:
             progress(plant.time)
-    return states[:done]
+    return states[:done], LoopRecord(command[:done], inputs[:done])
 
 
 def _blocks(last: int, changes: Changes) -> Iterator[NDArray[np.int64]]:
@@ -132,7 +130,7 @@ def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
     rows, block = [], list(islice(following, LONGEST + 1))
     while len(block) > 1:
         ticks = np.array(block)
-        outputs, _ = outputs_within(grid, ticks, scene.period_ns)
+        outputs = outputs_within(grid, ticks, scene.period_ns)
         loop = Loop(
             np.diff(ticks) * scene.period_ns / NANOSECONDS, ticks * scene.period_ns / NANOSECONDS, outputs.bounds,
             new_place(), np.empty((len(ticks) - 1, 3)), system.external_over(ticks[:-1]),
@@ -145,52 +143,49 @@ def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
     return np.concatenate([*rows, np.repeat(integrator.state[None], later, axis=0)])
 
 
-def outputs_within(grid: Array, ticks: NDArray[np.int64], period_ns: int) -> tuple[Outputs, NDArray[np.int64]]:
-    """Output times within the intervals [t, t') between ascending ticks, and the interval of each."""
+def outputs_within(grid: Array, ticks: NDArray[np.int64], period_ns: int) -> Outputs:
+    """Output times within the intervals [t, t') between ascending ticks."""
     times = ticks * period_ns / NANOSECONDS
     bounds = np.searchsorted(grid, times, side="left")
-    within = grid[bounds[0] : bounds[-1]]
-    interval = np.searchsorted(times, within, side="right") - 1
-    lengths = np.diff(ticks) * period_ns / NANOSECONDS
-    offsets = np.clip(within - times[interval], 0.0, lengths[interval])
-    return Outputs(offsets, bounds - bounds[0]), interval
+    outputs = Outputs(grid[bounds[0] : bounds[-1]], bounds - bounds[0])
+    interval, lengths = outputs.interval, np.diff(ticks) * period_ns / NANOSECONDS
+    return outputs._replace(offsets=np.clip(outputs.offsets - times[interval], 0.0, lengths[interval]))
 
 
-def drive(
-    scene: Scene, integrator: Integrator, sampled: bool, grid: Array, loop: LoopRecord | None = None,
-    changes: Changes = NO_CHANGES, by_user: Mapping[int, UserController] = NO_USER_CONTROLLERS,
-    progress: Progress = None,
-) -> Array:
+def drive(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -> Array:
     """States (n, 6) at the output times of a run to its end; fewer rows if it stops."""
     if sampled:
-        return drive_sampled(scene, grid, loop or new_loop(len(grid)), changes, by_user, progress, integrator)
+        return drive_sampled(scene, integrator, grid)[0]
     if scene.system.external:
         return drive_external(scene, grid, integrator)
     return integrator.run(one_interval(scene.duration, 0.0, len(grid)), grid)
 
 
 def solve(
-    scene: Scene, grid: Array, method: str, setting: float, sampled: bool, max_events: int, max_work: int,
-    changes: Changes = NO_CHANGES, by_user: Mapping[int, UserController] = NO_USER_CONTROLLERS,
-    progress: Progress = None,
+    scene: Scene, method: str, problem: Problem, changes: Changes = NO_CHANGES,
+    by_user: Mapping[int, UserController] = NO_USER_CONTROLLERS,
 ) -> tuple[Solution, LoopRecord | None]:
     """States at ascending output times (n,), events and counters, and what went through a sampled loop.
 
     All arguments have been checked. Columns of bodies that are not there are NaN.
     """
-    loop = new_loop(len(grid)) if sampled else None
-    found = METHODS[method].solve(Problem(
-        scene.system, scene.duration, grid, setting, max_events, max_work, sampled,
-        lambda integrator: drive(scene, integrator, sampled, grid, loop, changes, by_user, progress),
-        None if sampled else progress,
-    ))
+    loop: LoopRecord | None = None
+
+    def driven(integrator: Integrator) -> Array:
+        nonlocal loop
+        if not problem.sampled:
+            return drive(scene, integrator, False, problem.grid)
+        states, loop = drive_sampled(scene, integrator, problem.grid, changes, by_user, problem.progress)
+        return states
+
+    found = METHODS[method].solve(problem._replace(drive=driven))
     if not METHODS[method].energy_check:  # it does not look for the domain itself
         inside = (np.abs(found.state) <= np.tile([LARGEST_POSITION, LARGEST_SPEED], 3)).all(axis=1)  # nan is not
         if not inside.all():
             row = int(np.argmin(inside))
             status = Status.OUTSIDE if np.isfinite(found.state[row]).all() else Status.NOT_FINITE
-            early = found.event_table[:, Entry.TIME] < grid[row]
+            early = found.event_table[:, Entry.TIME] < problem.grid[row]
             found = found._replace(state=found.state[:row], event_table=found.event_table[early], status=status)
     for body in scene.system.absent:  # a slice takes a fifth of the time of a list of columns
         found.state[:, COLUMN[body] : COLUMN[body] + 2] = np.nan
-    return found, None if loop is None else LoopRecord(*(rows[: len(found.state)] for rows in loop))
+    return found, loop

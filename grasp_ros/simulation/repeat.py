@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from grasp_ros.exact.integrator import MAX_WORK, Integrator, Status
-from grasp_ros.methods.contract import Solution
+from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import OBJECT, Entry
@@ -100,7 +100,8 @@ def _solved(run: Trajectory, grid: Array) -> tuple[Solution, LoopRecord | None]:
         raise Refused(f"{run.scene.name}: its controllers cannot be asked again; allowed: output times at every control"
                       " period, as without a grid")
     most = UNLIMITED if run.method == EXACT else MAX_WORK
-    return solve(run.scene, grid, run.method, run.setting, run.sampled, UNLIMITED, most)
+    return solve(run.scene, run.method, Problem(
+        run.scene.system, run.scene.duration, grid, run.setting, UNLIMITED, most, run.sampled))
 
 
 def has_ticks(run: Trajectory, last: Array) -> bool:
@@ -116,8 +117,7 @@ def with_commands(run: Trajectory, grid: Array, integrator: Integrator) -> Array
     answers = np.zeros((count, 3))
     answers[:, :OBJECT] = run.command[np.searchsorted(run.t, tick_times(scene)[:count])]
     plant = SampledPlant(scene.system, scene.period_ns, integrator)
-    outputs, _ = outputs_within(grid, np.arange(count + 1), scene.period_ns)
-    states = plant.follow(answers, outputs)
+    states = plant.follow(answers, outputs_within(grid, np.arange(count + 1), scene.period_ns))
     if plant.status is Status.DONE:
         states = np.concatenate([states, np.repeat(plant.state[None], len(grid) - len(states), axis=0)])
     states[:, scene.system.absent_columns] = np.nan

@@ -44,16 +44,16 @@ class LoopRecord(NamedTuple):
     inputs: Array  # (n, 3), N by body
 
 
-def new_loop(n: int) -> LoopRecord:
-    """A record of n output times, to be filled."""
-    return LoopRecord(np.empty((n, 2)), np.full((n, 3), np.nan))
-
-
 class Outputs(NamedTuple):
     """Output times within consecutive intervals."""
 
     offsets: Array  # (m,) s, ascending within each interval, from its beginning
     bounds: NDArray[np.int64]  # (n + 1,) how many of them come before each interval, and in all
+
+    @property
+    def interval(self) -> NDArray[np.int64]:
+        """The interval of each output time, (m,)."""
+        return np.repeat(np.arange(len(self.bounds) - 1), np.diff(self.bounds))
 
 
 BARE = Loop(NO_TIMES, NO_TIMES, np.zeros(1, dtype=np.int64), new_place())  # answers are given

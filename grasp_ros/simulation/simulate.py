@@ -11,6 +11,7 @@ import numpy as np
 
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
 from grasp_ros.methods import registry
+from grasp_ros.methods.contract import Problem
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused
@@ -20,8 +21,8 @@ from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.scene.places import check_scene
 from grasp_ros.sensitivity.directions import check_keys
-from grasp_ros.simulation.closed_loop import NO_CHANGES, Changes, Progress, check_changes, solve, wrap_controllers
-from grasp_ros.simulation.progress import showing
+from grasp_ros.simulation.closed_loop import NO_CHANGES, Changes, check_changes, solve, wrap_controllers
+from grasp_ros.simulation.progress import Callback, showing
 from grasp_ros.simulation.sampled_plant import tick_times
 from grasp_ros.simulation.trajectory import Trajectory
 
@@ -41,7 +42,7 @@ def simulate(
     changes: Changes = NO_CHANGES,
     controllers: Mapping[str, Law | type] = MappingProxyType({}),
     sensitivity: Sequence[str] | None = None,
-    progress: Progress | bool = None,
+    progress: Callback | bool | None = None,
 ) -> Trajectory:
     """Simulate a scene from its initial state to the end of its horizon.
 
@@ -107,7 +108,8 @@ def simulate(
     grid = ascending("grid", grid, scene.duration)  # new: kernels are compiled anew for arrays that nobody may write to
     by_user = wrap_controllers(scene, controllers)
     with showing(progress, scene.duration, "s", scene.name) as progress:
-        found, loop = solve(scene, grid, method, setting, sampled, max_events, max_work, changes, by_user, progress)
+        problem = Problem(scene.system, scene.duration, grid, setting, max_events, max_work, sampled, progress=progress)
+        found, loop = solve(scene, method, problem, changes, by_user)
         if progress is not None and found.status is Status.DONE:
             progress(scene.duration)
     changed = {name.split("_")[0]: CHANGED for numbers in changes.values() for name in numbers}
