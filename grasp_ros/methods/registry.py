@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from grasp_ros.exact.integrator import MAX_WORK, Integrator
+from grasp_ros.exact.records import one_interval
 from grasp_ros.methods import discrete_gradient, fixed_step, library
 from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, Method, Problem, Solution
 from grasp_ros.methods.equations import Work
@@ -37,8 +38,10 @@ def _exact(problem: Problem) -> Solution:
         max_work=problem.max_work,
     )
     integrator.progress = problem.progress
-    drive = problem.drive or (lambda free: free.advance(problem.duration, problem.grid))
-    states = drive(integrator)
+    if problem.drive is None:
+        states = integrator.run(one_interval(problem.duration, 0.0, len(problem.grid)), problem.grid)
+    else:
+        states = problem.drive(integrator)
     return Solution(states, integrator.event_table, integrator.work, integrator.status, integrator.stop,
                     integrator.at_rest)
 

@@ -145,10 +145,10 @@ def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
 
 def outputs_within(grid: Array, ticks: NDArray[np.int64], period_ns: int) -> Outputs:
     """Output times within the intervals [t, t') between ascending ticks."""
-    times = ticks * period_ns / NANOSECONDS
+    times, lengths = ticks * period_ns / NANOSECONDS, (ticks[1:] - ticks[:-1]) * period_ns / NANOSECONDS
     bounds = np.searchsorted(grid, times, side="left")
     outputs = Outputs(grid[bounds[0] : bounds[-1]], bounds - bounds[0])
-    interval, lengths = outputs.interval, np.diff(ticks) * period_ns / NANOSECONDS
+    interval = outputs.interval
     return outputs._replace(offsets=np.clip(outputs.offsets - times[interval], 0.0, lengths[interval]))
 
 
@@ -171,14 +171,16 @@ def solve(
     """
     loop: LoopRecord | None = None
 
-    def driven(integrator: Integrator) -> Array:
+    def run_sampled(integrator: Integrator) -> Array:
         nonlocal loop
-        if not problem.sampled:
-            return drive(scene, integrator, False, problem.grid)
         states, loop = drive_sampled(scene, integrator, problem.grid, changes, by_user, problem.progress)
         return states
 
-    found = METHODS[method].solve(problem._replace(drive=driven))
+    if problem.sampled:
+        problem = problem._replace(drive=run_sampled)
+    elif scene.system.external:
+        problem = problem._replace(drive=lambda integrator: drive_external(scene, problem.grid, integrator))
+    found = METHODS[method].solve(problem)
     if not METHODS[method].energy_check:  # it does not look for the domain itself
         inside = (np.abs(found.state) <= np.tile([LARGEST_POSITION, LARGEST_SPEED], 3)).all(axis=1)  # nan is not
         if not inside.all():

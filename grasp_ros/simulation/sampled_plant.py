@@ -53,7 +53,7 @@ class Outputs(NamedTuple):
     @property
     def interval(self) -> NDArray[np.int64]:
         """The interval of each output time, (m,)."""
-        return np.repeat(np.arange(len(self.bounds) - 1), np.diff(self.bounds))
+        return np.arange(len(self.bounds) - 1).repeat(self.bounds[1:] - self.bounds[:-1])
 
 
 BARE = Loop(NO_TIMES, NO_TIMES, np.zeros(1, dtype=np.int64), new_place())  # answers are given
