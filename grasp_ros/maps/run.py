@@ -13,7 +13,7 @@ import signal
 import time
 from collections.abc import Callable, Generator, Iterable
 from contextlib import closing, nullcontext
-from functools import cache
+from functools import cache, partial
 from itertools import islice
 from multiprocessing.resource_tracker import ensure_running
 from pathlib import Path
@@ -26,7 +26,7 @@ from grasp_ros.maps.plan import Plan
 from grasp_ros.maps.store import Store
 from grasp_ros.physics.errors import Refused, need
 from grasp_ros.scene.versions import versions
-from grasp_ros.simulation.chunk import Chunk, compute
+from grasp_ros.simulation.chunk import NEVER, Chunk, compute
 from grasp_ros.simulation.ensemble import Span, chunk_rows, in_threads
 
 AHEAD = 3  # chunks for each worker that are handed out
@@ -40,38 +40,39 @@ def run(
     """Compute what a file does not have yet: a new directory, or the map of the same plan.
 
     `workers` are processes of a Dask cluster that is started for it, 0: threads of this process; `scheduler` is the
-    address of one that exists. `progress` is told the number of rows that are done. Refused: a file that is something
-    else or cannot be written, workers that die again and again; what is done is kept.
+    address of one that exists. `progress` gets the number of rows that are done. Refused: a file that is something else
+    or cannot be written, workers that die again and again; what is done is kept.
     """
-    def work(span: Span, stop: NDArray[np.int64]) -> Chunk:
-        return compute(plan.variants(*span), plan.setup, stop)
-
-    path, told = Path(path), progress or (lambda _: None)
-    rows = 1 if path.exists() else chunk_rows(plan.scene, plan.setup, _seconds(plan))
-    if path.exists() and not Store(path, plan, rows).spans:  # it is done, and needs no cluster
-        told(plan.rows)
-        return
+    path, report = Path(path), progress or (lambda _: None)
+    store = Store(path, plan) if path.exists() else None
+    rows = 1 if store else chunk_rows(plan.scene, plan.setup, _seconds(plan))
+    on_others = (workers or scheduler) and (store is None or store.spans)  # a map that is done needs no cluster
     # First, so that a scheduler that does not answer leaves no file behind.
-    with connect(workers, scheduler) if workers or scheduler else nullcontext() as client:
-        store = Store(path, plan, rows)
+    with connect(workers, scheduler) if on_others else nullcontext() as client:
+        store = store or Store(path, plan, rows)
         spans = store.spans
         done = plan.rows - sum(last - first for first, last in spans)
-        told(done)
-        with closing(in_threads(work, spans) if client is None else on_cluster(client, plan, spans)) as found:
-            for span, chunk in found:
+        report(done)
+        with closing(in_threads(partial(_compute, plan), spans) if client is None
+                     else on_cluster(client, plan, spans)) as chunks:
+            for span, chunk in chunks:
                 store.write(span, chunk)
                 done += span[1] - span[0]
-                told(done)
+                report(done)
+
+
+def _compute(plan: Plan, span: Span, stop: NDArray[np.int64] = NEVER) -> Chunk:
+    return compute(plan.variants(*span), plan.setup, stop)
 
 
 def _seconds(plan: Plan) -> float:
-    """Longest wall time of three rows: how far one goes on until it has settled, nobody knows before."""
+    """Longest wall time of three rows: how long one takes until it has settled is only known afterwards."""
     def spent(row: int) -> float:
         begin = time.monotonic()
-        compute(plan.variants(row, row + 1), plan.setup)
+        _compute(plan, (row, row + 1))
         return time.monotonic() - begin
 
-    spent(0)  # it compiles or loads what it takes
+    spent(0)  # the first run compiles kernels, or loads them
     return max(min(spent(row), spent(row)) for row in (0, plan.rows // 2, plan.rows - 1))  # the machine may be busy
 
 
@@ -83,7 +84,7 @@ def _known(document: str) -> tuple[dict[str, str], Plan]:
 def work(document: str, span: Span) -> tuple[dict[str, str], Chunk]:
     """One chunk, and the versions that it was computed with; what a worker does."""
     found, plan = _known(document)
-    return found, compute(plan.variants(*span), plan.setup)
+    return found, _compute(plan, span)
 
 
 def connect(workers: int, scheduler: str) -> Any:

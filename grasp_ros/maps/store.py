@@ -33,7 +33,7 @@ class Store:
     `rows` are those of a chunk, of a new file only.
     """
 
-    def __init__(self, path: Path, plan: Plan, rows: int) -> None:
+    def __init__(self, path: Path, plan: Plan, rows: int = 1) -> None:
         self.path, self.plan = path, plan
         wanted = json.loads(json.dumps(plan.to_document()))
         self._lines = plan.rows // plan.shape[0]

@@ -7,6 +7,8 @@ no outcomes but its last state.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import reduce
+from operator import or_
 from typing import NamedTuple
 
 import numpy as np
@@ -135,8 +137,5 @@ def find(names: Iterable[str]) -> list[Outcome]:
 
 
 def wanted_by(columns: Iterable[Outcome]) -> Wanted:
-    """What a run must be watched for."""
-    total = NOTHING
-    for column in columns:
-        total |= column.wanted
-    return total
+    """What a run must be observed for."""
+    return reduce(or_, (column.wanted for column in columns), NOTHING)
