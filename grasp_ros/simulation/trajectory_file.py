@@ -62,15 +62,21 @@ def _check(found: Trajectory) -> None:
     """Refuse numbers that no run has."""
     events, end, done = found.event_table, found.scene.duration, found.status is Status.DONE
     gone = found.scene.system.absent_columns
-    there, absent = np.delete(found.state, gone, axis=1), found.state[:, gone]
     acted = found.scene.ticks if found.sampled else 0
+    n = len(found.t)
+    shapes = [("state", found.state, (n, 6)), ("events", events, (len(events), 5)),
+              ("work", found.work, (len(found.counters),))]
+    if found.loop is not None:
+        shapes += [("command", found.loop.command, (n, 2)), ("inputs", found.loop.inputs, (n, 3))]
+    for name, values, shape in shapes:
+        if values.shape != shape:
+            raise Refused(f"{name}: shape {values.shape} is not allowed; allowed: {shape}")
     given.ascending("t", found.t, end)
     given.ascending("events", events[:, Entry.TIME], end)
+    there, absent = np.delete(found.state, gone, axis=1), found.state[:, gone]
     for name, good, allowed in (
         ("state", not done or np.isfinite(there).all(), "finite numbers"),
         ("state", np.isnan(absent).all(), "NaN for a body that is not there"),
-        ("command", found.command.shape == (len(found.t), 2), "two numbers for each output time"),
-        ("inputs", found.inputs.shape == (len(found.t), 3), "three numbers for each output time"),
         ("command", not done or np.isfinite(found.command).all(), "finite numbers"),
         ("inputs", not acted or np.isnan(found.inputs[tick_of(found.scene, found.t) == acted]).all(), "NaN at the end"),
         ("events", np.isfinite(events).all() and np.isin(events[:, 1], list(COLUMN)).all(), "events of this scene"),
