@@ -26,6 +26,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.force import SECTIONS
 from grasp_ros.simulation.simulate import GRID_POINTS, simulate
+from grasp_ros.simulation.trajectory import Trajectory
 
 DONE = "done"
 OURS = "grasp_ros"
@@ -48,13 +49,16 @@ def finest(scene: Scene) -> Truth:
     run = simulate(scene, grid=grid, setting=FINEST)
     if run.status is not Status.DONE:
         raise Refused(f"{scene.name}: {run.stop}; allowed here: a scene that runs to its end")
-    left, right = (len(run.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))
-    truth, rounding = Truth(grid, run.state, (left, right)), EPS * float(np.nanmax(np.abs(run.state[:, 0::2])))
+    truth, rounding = Truth(grid, run.state, _touches(run)), EPS * float(np.nanmax(np.abs(run.state[:, 0::2])))
     apart = [distance(truth, simulate(scene, grid=grid, setting=FINER * FINEST).state) / FINER]
     for body in {*SECTIONS} & {*scene.values}:
         beside = scene.changed({f"{body}.position_m": scene.values[body]["position_m"] + rounding})  # farther right
         apart.append(distance(truth, simulate(beside, grid=grid, setting=FINEST).state))
     return truth._replace(uncertainty=max(apart))
+
+
+def _touches(run: Trajectory) -> tuple[int, int]:
+    return len(run.times(Transition.TOUCH, LEFT)), len(run.times(Transition.TOUCH, RIGHT))
 
 
 def distance(truth: Truth, state: Array) -> float:
@@ -110,10 +114,7 @@ def simulated(name: str, scene: Scene, setting: float) -> Solve:
     """A method of `grasp simulate` as a contender builds it."""
     def solve(grid: Array) -> Answer:
         run = simulate(scene, grid=grid, method=name, setting=setting)
-        touches = None
-        if METHODS[name].events:
-            touches = len(run.times(Transition.TOUCH, LEFT)), len(run.times(Transition.TOUCH, RIGHT))
-        counts = run.counters
+        touches, counts = _touches(run) if METHODS[name].events else None, run.counters
         steps = sum(counts.get(counter, 0) for counter in ("steps", "flights", "contact steps"))
         return Answer(run.state, touches,
                       DONE if run.status is Status.DONE else run.status.value, steps, counts.get("right hand sides"))

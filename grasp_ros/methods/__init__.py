@@ -1,10 +1,9 @@
-"""Methods of integration: `exact` and others, behind one door.
+"""Methods of integration: `exact` and others.
 
-`registry.METHODS` is the table of all of them, `registry.check` refuses what a method cannot do, and `Method.solve` is
-the door. The methods know the physics and the scenes, and nothing above.
+`registry.METHODS` is the table of all; `registry.check` refuses what a method cannot do; `Method.solve` runs it.
 
-Whoever adds a method writes a function of a `Problem` that returns a `Solution`, both in `contract`, and a row of the
-table. The contract, which a test runs every row through:
+To add a method, write a function of a `Problem` that returns a `Solution`, both in `contract`, and a row of the table.
+The contract, which a test checks for every row:
 
 1.  Given are a `System`, a duration, output times, one setting, two budgets, and, for some methods, a drive. They are
     read, never written; the method keeps nothing from one call to the next.

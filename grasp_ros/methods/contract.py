@@ -26,7 +26,7 @@ class Problem(NamedTuple):
     max_work: int = MAX_WORK
     sampled: bool = False  # the controllers are in `drive`; otherwise their feedback acts continuously
     drive: Drive | None = None  # inputs that change on the way; None: continuous feedback alone
-    progress: Callable[[float], object] | None = None  # told the time reached in s, where the method knows it
+    progress: Callable[[float], object] | None = None  # gets the time reached in s, where the method knows it
 
 
 class Solution(NamedTuple):
@@ -37,7 +37,7 @@ class Solution(NamedTuple):
     work: Any  # int array (k,), one for each of `Method.counters`
     status: Status
     stop: str = ""  # why and where it stopped, if the method can say more than its status
-    at_rest: float | None = None  # s, since when everything is at rest for good; None: it is not, or nobody knows
+    at_rest: float | None = None  # s, since when everything is at rest for good; None: it is not, or is not known
 
 
 class Method(NamedTuple):

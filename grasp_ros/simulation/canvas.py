@@ -1,4 +1,4 @@
-"""Figures of our own: matplotlib with its defaults, whatever the settings of whoever runs us say.
+"""Figures of this package: matplotlib with its defaults, whatever the settings of the user.
 
 No window, no backend and no setting of the process is touched, so that a notebook keeps its own. A `matplotlibrc` that
 cannot be read, and a backend that is not there, are left aside.
@@ -33,15 +33,15 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: E402
 from matplotlib.colors import LogNorm, Normalize  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 
-__all__ = ["Axes", "Figure", "LogNorm", "Normalize", "colormaps", "figure", "style", "subplots"]  # behind this door
+__all__ = ["Axes", "Figure", "LogNorm", "Normalize", "colormaps", "figure", "style", "subplots"]
 OTHERS = ("backend", "backend_fallback", "interactive", "toolbar", "timezone")  # of windows and of dates: we draw none
 DEFAULTS = {name: value for name, value in matplotlib.rcParamsDefault.items() if name not in OTHERS}
-DEFAULTS["axes.formatter.useoffset"] = False  # 19.995, and not 0.005 beside a small +1.999e1
+DEFAULTS["axes.formatter.useoffset"] = False  # 19.995, and not 0.005 with an offset +1.999e1
 
 
 @contextmanager
 def style(own: Mapping[str, Any] | None = None) -> Iterator[None]:
-    """Within it matplotlib has its defaults, but for settings of our own: all of a figure is drawn there."""
+    """Draw with the defaults of matplotlib, but for some settings: a whole figure is drawn within it."""
     with matplotlib.rc_context({**DEFAULTS, **(own or {})}):
         yield
 

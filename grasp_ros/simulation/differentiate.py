@@ -51,7 +51,7 @@ class Sensitivity(Frozen):
     corner : float or None
         Time in s from which on one-sided derivatives differ, because an object under dry friction turns where it could
         as well stay, or stops just when inputs change, a pair begins at u' = -1/p and nothing moves it off, or a
-        command is just at its limit; None: nowhere. An object that friction just holds, to the last digit, is not told.
+        command is just at its limit; None: nowhere. An object that friction just holds, to the last digit, is missed.
     """
 
     scene: Scene

@@ -4,9 +4,9 @@ A row gives the bits of `simulate` for the scene with its numbers: it is the sam
 an observer in place of an output grid. Rows know nothing of each other, so that they do not depend on
 threads, order or chunks. A row that a scene's rules refuse, or whose run stops, says so in a sentence.
 
-Rows are computed in chunks, which are all that memory holds beside the table: the kernels release the interpreter's
-lock, so that threads share the work. `chunk.compute` does one; the threads here, and the processes of `maps`, only say
-which one is next.
+Rows are computed in chunks, which are all that memory holds besides the table: the kernels release the interpreter's
+lock, so that threads share the work. `chunk.compute` computes one; the threads here and the processes of `maps` only
+choose the next one.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ def ensemble(
     outcomes : sequence of str
         Columns or groups of `outcomes`.
     setup : Setup, optional
-        All that the rows depend on beside; its outcomes give way to those above.
+        Settings of the runs; the outcomes above replace its own.
     sensitivity : sequence of str, optional
         Numbers, "section.key", by which the last states and V_c are differentiated through all impacts: columns such as
         "x_left_end by KEY", each by the unit of its key. `V_c_end` is V_c there, and `corner` the time in s from which
@@ -137,7 +137,7 @@ def ensemble(
     threads : int, optional
         Default: one for each core. The result does not depend on it.
     progress : callable or True, optional
-        True: a bar, in a terminal or in a notebook. A callable is told how many rows are done.
+        True: a bar, in a terminal or in a notebook. A callable gets the number of rows that are done.
 
     Raises
     ------
@@ -164,15 +164,15 @@ def ensemble(
         return with_derivatives(chunk, part, setup, keys, stop)
 
     reached = 0
-    with showing(progress, variants.rows, "run", scene.name) as told:
+    with showing(progress, variants.rows, "run", scene.name) as report:
         for (first, last), chunk in in_threads(work, spans, threads):
             for name, values in chunk.columns.items():
                 found[name][first:last] = values
             status[first:last] = chunk.status
             stops.update({first + i: stop for i, stop in chunk.stops.items()})
             reached += last - first
-            if told is not None:
-                told(reached)
+            if report is not None:
+                report(reached)
     return Table(scene, setup, variants.changes, found, status, stops)
 
 
@@ -184,9 +184,9 @@ def chunk_rows(scene: Scene, setup: Setup, seconds: float = 0.0) -> int:
 
 def in_threads(work: Callable[[Span, NDArray[np.int64]], T], spans: Iterable[Span], threads: int | None = None
                ) -> Generator[tuple[Span, T], None, None]:
-    """Do chunks in threads, and hand each over when it is done; no more are begun than threads can soon take up.
+    """Compute chunks in threads, and yield each when it is done; twice as many as threads are queued at most.
 
-    The work is handed what it is to look at now and then: not 0 asks it to stop, after a Ctrl-C say.
+    The work also gets an array (1,) to poll: not 0 asks it to stop, for example after a Ctrl-C.
     """
     workers = whole("threads", threads, 1) if threads is not None else os.cpu_count() or 1
     waiting: dict[Future[T], Span] = {}

@@ -50,7 +50,7 @@ def losses(run: Trajectory) -> Losses:
     """Energy lost by each cause over the whole run, in J, or up to the last output time where these tell it.
 
     What a held command does is not a loss of Kv: under sampled feedback `feedback` is the work that the commands took
-    out of the arms, beside what they have stored in V_c. Half of what V_c fell by is the total less the work of
+    out of the arms, besides what they have stored in V_c. Half of what V_c fell by is the total less the work of
     external forces.
 
     Raises
@@ -97,7 +97,7 @@ def losses_of(run: Trajectory, row: Mapping[str, float] | None) -> Losses:
         return found
     work = float((run.inputs[:-1] * _moves(run)).sum()) if row is None else row["work_inputs"]
     work -= external_work(run, row)
-    own = 0.0 if run.controllers else 1.0  # nobody knows what a controller of one's own stores
+    own = 0.0 if run.controllers else 1.0  # what a user's controller stores is not known
     _, stiffness, _, force = own * (system.closed_loop - system.bodies)[:OBJECT].T  # of the feedback
     ends = np.stack([run.scene.initial_state, np.nan_to_num(run.state[-1])])[:, arms]
     before, after = (0.5 * stiffness * ends**2 - force * ends).sum(axis=1)

@@ -1,4 +1,4 @@
-"""A run again, with other output times, which is its dense output, or watched, for its outcomes.
+"""Runs integrated again: with other output times, for the dense output, or with an observer, for outcomes.
 
 No state depends on the other output times, not in its last bit, so that the run with the wanted times is the dense
 output. It costs as much as the run, and holds for every method. Commands that were recorded at every control period are
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from grasp_ros.exact.integrator import MAX_WORK, Integrator, Status
+from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.errors import Refused
@@ -28,7 +28,7 @@ from grasp_ros.simulation.sampled_plant import LoopRecord, SampledPlant, tick_of
 if TYPE_CHECKING:  # it imports this file
     from grasp_ros.simulation.trajectory import Trajectory
 
-UNLIMITED = 2**62  # budgets of a run that has been there before
+UNLIMITED = 2**62  # budgets of a run that was within its budgets before
 
 
 def reached(run: Trajectory) -> float:
@@ -99,9 +99,8 @@ def _solved(run: Trajectory, grid: Array) -> tuple[Solution, LoopRecord | None]:
     if run.controllers:
         raise Refused(f"{run.scene.name}: its controllers cannot be asked again; allowed: output times at every control"
                       " period, as without a grid")
-    most = UNLIMITED if run.method == EXACT else MAX_WORK
     return solve(run.scene, run.method, Problem(
-        run.scene.system, run.scene.duration, grid, run.setting, UNLIMITED, most, run.sampled))
+        run.scene.system, run.scene.duration, grid, run.setting, UNLIMITED, UNLIMITED, run.sampled))
 
 
 def has_ticks(run: Trajectory, last: Array) -> bool:
@@ -125,7 +124,7 @@ def with_commands(run: Trajectory, grid: Array, integrator: Integrator) -> Array
 
 
 def as_row(run: Trajectory, *outcomes: str, horizons: int = HORIZONS) -> dict[str, float] | None:
-    """Outcomes of an exact run, those of a row of an ensemble: it is integrated again, and watched.
+    """Outcomes of an exact run, those of a row of an ensemble: it is integrated again, with an observer.
 
     Other controllers than the scene's act by their recorded commands. None for another method, a run that stopped, one
     that ends elsewhere, and where such commands were not recorded at every control period.

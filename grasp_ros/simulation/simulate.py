@@ -78,7 +78,7 @@ def simulate(
         Numbers of the scene, "section.key", by which the motion is differentiated through its impacts, see
         `Trajectory.sensitivity`. The run is made twice, because the times of events are outputs of the second one.
     progress : callable or True, optional
-        True: a bar, in a terminal or in a notebook. A callable is told the time reached, in s: at the end of the
+        True: a bar, in a terminal or in a notebook. A callable gets the time reached, in s: at the end of the
         horizon, if the run gets there, and on the way, except by methods with a fixed step.
 
     Raises
