@@ -118,7 +118,7 @@ def _blocks(last: int, changes: Changes) -> Iterator[NDArray[np.int64]]:
     yield np.array([last])
 
 
-def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
+def drive_external(scene: Scene, integrator: Integrator, grid: Array) -> Array:
     """States (n, 6) under continuous feedback and external forces; only the rows reached, if the integrator stops.
 
     An interval lasts until a force changes: cutting it at every tick would only cost time. The ticks of a run may be
@@ -157,7 +157,7 @@ def drive(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -> A
     if sampled:
         return drive_sampled(scene, integrator, grid)[0]
     if scene.system.external:
-        return drive_external(scene, grid, integrator)
+        return drive_external(scene, integrator, grid)
     return integrator.run(one_interval(scene.duration, 0.0, len(grid)), grid)
 
 
@@ -179,7 +179,7 @@ def solve(
     if problem.sampled:
         problem = problem._replace(drive=run_sampled)
     elif scene.system.external:
-        problem = problem._replace(drive=lambda integrator: drive_external(scene, problem.grid, integrator))
+        problem = problem._replace(drive=lambda integrator: drive_external(scene, integrator, problem.grid))
     found = METHODS[method].solve(problem)
     if not METHODS[method].energy_check:  # it does not look for the domain itself
         inside = (np.abs(found.state) <= np.tile([LARGEST_POSITION, LARGEST_SPEED], 3)).all(axis=1)  # nan is not

@@ -34,7 +34,7 @@ UNLIMITED = 2**62  # budgets of a run that was within its budgets before
 def reached(run: Trajectory) -> float:
     """Time in s up to which a run is known."""
     end = run.scene.duration if run.status is Status.DONE else 0.0
-    return float(max([end, *run.t[-1:], *run.event_table[-1:, 0]]))  # an event there may be a rounding behind the end
+    return float(max([end, *run.t[-1:], *run.event_table[-1:, Entry.TIME]]))  # which may be a rounding behind the end
 
 
 def integrator_of(run: Trajectory) -> Integrator:

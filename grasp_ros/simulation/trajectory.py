@@ -253,8 +253,8 @@ class Trajectory(Tabular, Frozen):
             if value not in [*known]:
                 allowed = ", ".join(f"{known.__name__}.{one.name}" for one in known)
                 raise Refused(f"{name}: {value!r} is not allowed; allowed: {allowed}")
-        chosen: Array = self.event_table[(self.event_table[:, 1] == side) & (self.event_table[:, 2] == kind), 0]
-        return chosen
+        table = self.event_table
+        return np.asarray(table[(table[:, Entry.BODY] == side) & (table[:, Entry.KIND] == kind), Entry.TIME])
 
     def save(self, path: str | os.PathLike[str] | BinaryIO) -> None:
         """Write everything to a .npz file, by its path or open.

@@ -79,8 +79,9 @@ def _check(found: Trajectory) -> None:
         ("state", np.isnan(absent).all(), "NaN for a body that is not there"),
         ("command", not done or np.isfinite(found.command).all(), "finite numbers"),
         ("inputs", not acted or np.isnan(found.inputs[tick_of(found.scene, found.t) == acted]).all(), "NaN at the end"),
-        ("events", np.isfinite(events).all() and np.isin(events[:, 1], list(COLUMN)).all(), "events of this scene"),
-        ("events", np.isin(events[:, 2], list(Transition)).all(), "events of this scene"),
+        ("events", np.isfinite(events).all(), "events of this scene"),
+        ("events", np.isin(events[:, Entry.BODY], list(COLUMN)).all(), "events of this scene"),
+        ("events", np.isin(events[:, Entry.KIND], list(Transition)).all(), "events of this scene"),
         ("work", (found.work >= 0).all(), "numbers >= 0"),
         ("setting", np.isfinite(found.setting) and found.setting > 0.0, "a number > 0"),
     ):
