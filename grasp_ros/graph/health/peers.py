@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, NamedTuple
 
-from grasp_ros.graph.health.heartbeat import ENDED, Heartbeats, digest
+from grasp_ros.graph.health.heartbeat import ENDED, Heartbeat, Heartbeats, digest
 from grasp_ros.graph.health.watchdog import Watchdog
 from grasp_ros.graph.parameters import check_timeouts
 from grasp_ros.graph.ros.node import PATIENCE_SECONDS, GraspNode, Phase
@@ -89,10 +89,10 @@ class PeerNode(GraspNode):
         """Something that changes while all is well."""
 
     def report(self) -> None:
-        """Publish the counters; say who publishes what somebody else does."""
-        for topic in self.inputs:
+        """Publish the counters; name the publishers of a topic that has more than one."""
+        for topic, why in self.inputs.items():
             if topic not in (ALIVE, DIAGNOSTICS) and len(self.living(topic)) > 1:
-                self.refuse("second sources", topic)
+                self.refuse("second sources", topic, why)
         super().report()
 
     def look(self) -> None:
@@ -183,13 +183,23 @@ class PeerNode(GraspNode):
             self.get_logger().error(f"{trouble.words}; keeps waiting")
         self.trouble = f"waits for {', '.join(self._silent)}" if self._silent else ""
 
+    def is_dead(self, beat: Heartbeat) -> bool:
+        """Whether a process has ended or is silent."""
+        return bool(beat.ended) or beat.heard < time.monotonic() - self.patience
+
     def living(self, topic: Topic) -> list[str]:
         """Sources of a topic without processes that are known to be dead: DDS lists these for up to LEASE_SECONDS."""
-        found, limit = [], time.monotonic() - self.patience
+        found = []
         for name, number in Counter(self.sources(topic)).items():
-            dead = [beat for beat in self.heartbeats.of([name]) if beat.ended or beat.heard < limit]
-            found += [name] * max(1, number - len(dead))
+            dead = sum(map(self.is_dead, self.heartbeats.of([name])))
+            found += [name] * max(1, number - dead)
         return found
+
+    def missing(self, topic: Topic) -> str:
+        """A topic that does not have exactly one living source, with the names of several; else nothing."""
+        names = self.living(topic)
+        several = f" from one publisher, not {' and '.join(names)}" if names else ""
+        return "" if len(names) == 1 else f"{topic.name}{several}"
 
     def on_text(self, topic: Topic, take: Callable[[str], None]) -> None:
         """Subscribe to a text; accepted if a living node sends its digest, or if no node sends digests."""

@@ -56,9 +56,7 @@ class Lockstep:
         """Command topics that do not have exactly one source, with the names of several."""
         for sources in self._sources.values():
             sources.begin()
-        found = {topic.name: self._plant.living(topic) for topic in self.topics}
-        return [f"{name} from one publisher, not {' and '.join(nodes)}" if nodes else name
-                for name, nodes in found.items() if len(nodes) != 1]
+        return [*filter(None, map(self._plant.missing, self.topics))]
 
     def start(self) -> None:
         """Go on without a command where none will ever come."""

@@ -63,6 +63,7 @@ class Plant(PeerNode):
         self._forces = [(self.publisher(output.topic), template_of(output.topic), output.value)
                         for output in self.scene.outputs]
         self._simulated = self.publisher(CLOCK)
+        self.inputs[CLOCK] = "use_sim_time jumps between their times"  # of all that read it
         self._descriptions = [self.publisher(RUN), self.publisher(SCENE)]
         texts = [running.to_yaml(), self.scene.to_yaml()]
         self.heartbeats.own.texts = [digest(text) for text in texts]
@@ -105,22 +106,18 @@ class Plant(PeerNode):
     def _on_lyapunov(self, cdr: bytes) -> None:
         stamp = raw_stamp_ns(cdr) if len(cdr) >= SHORTEST else -1
         tick, rest = divmod(stamp, self.scene.period_ns)
-        fits = max(self._recorded, 0) <= tick <= self.tick
-        if rest or not (fits or self.resets):
+        newest = 0 if self.resets and self._recorded < 0 else self.tick  # others are of the time before a reset
+        if not rest and max(self._recorded, 0) <= tick <= newest:
+            self._recorded, self.heard_of_record = tick, time.monotonic()
+            self.loop.advance()
+        elif rest or not self.resets:
             self.refuse("refused records", LYAPUNOV)
-            return
-        if not fits or (self.resets and self._recorded < 0 < tick):  # it was on its way when the plant was put back
-            return
-        self._recorded, self.heard_of_record = tick, time.monotonic()
-        self.loop.advance()
 
     def report(self) -> None:
-        """Publish the counters, and see to it that nobody else plays the plant."""
+        """Publish the counters; fail if there is another plant."""
         self.counters.update(tick=self.tick, resets=self.resets)
-        if len(self.living(CLOCK)) > 1:
-            self.refuse("second sources", CLOCK, "use_sim_time jumps between their times")
         super().report()
-        self._insist()
+        self._refuse_other_plants()
         self.loop.report()
 
     def needs(self) -> Iterator[Need]:
@@ -142,22 +139,17 @@ class Plant(PeerNode):
         if self.begun and not self.finished:
             self.loop.ask_again(time.monotonic())
 
-    def _insist(self) -> list[str]:
-        """Fail if there is another plant; before the start, names of those that are silent: they may be dead."""
+    def _refuse_other_plants(self) -> None:
+        """Fail if there is another one; before the start, only if it has a heartbeat: others may be dead."""
         names = self.sources(JOINT_STATES)
-        limit = time.monotonic() - self.patience
-        alive = any(beat.node in names and beat.heard >= limit for beat in self.heartbeats.alive)
-        strange = self.living(JOINT_STATES) if len(names) > 1 else []
-        if alive or (self.begun and len(strange) > 1):
-            topic = self._states.topic_name
-            self.fail(f"{topic}: another plant publishes here, sources {', '.join(names)};"
+        alive = not all(map(self.is_dead, self.heartbeats.of(names)))
+        if alive or (self.begun and len(self.living(JOINT_STATES)) > 1):
+            self.fail(f"{self._states.topic_name}: another plant publishes here, sources {', '.join(names)};"
                       " use another ROS_DOMAIN_ID or namespace")
-        return names if len(strange) > 1 else []
 
     def _ready(self) -> bool:
-        strange = self._insist()
-        missing = [f"{JOINT_STATES.name} from one publisher, not {' and '.join(strange)}"] if strange else []
-        missing += self.loop.missing()
+        self._refuse_other_plants()
+        missing = [*filter(None, [self.missing(JOINT_STATES)]), *self.loop.missing()]
         monitor = [LYAPUNOV] if self.monitored else []
         missing += [] if self.linked(self._states, monitor) else [LYAPUNOV.name]
         if missing:

@@ -62,7 +62,8 @@ class GraspNode(ParameterNode):
         self.finished = False  # whether there is nothing left to do
         self.exit_code = 0  # 1 after a failure, 2 after a refusal before it has begun
         self.counters: dict[str, int | float | str] = {}  # the values of its /diagnostics
-        self.inputs: list[Topic] = []  # what it subscribes to
+        # Topics that it or its readers take from one publisher; what more would do beside.
+        self.inputs: dict[Topic, str] = {}
         self._complaints: dict[tuple[str, Topic], float] = {}  # when to say it again
         self.concern = ""  # what is not as it should be, although the node goes on
         self.trouble = ""  # what keeps it from going on
@@ -82,7 +83,7 @@ class GraspNode(ParameterNode):
 
         What cannot be decoded is refused here: the executor would raise.
         """
-        self.inputs.append(topic)
+        self.inputs[topic] = ""
         kind = messages.TYPES[topic.type]
 
         def decode(cdr: bytes) -> None:
