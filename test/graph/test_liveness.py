@@ -24,7 +24,7 @@ from std_srvs.srv import Trigger
 from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.verify import verify
-from grasp_ros.graph.health.heartbeat import Heartbeats
+from grasp_ros.graph.health.heartbeat import Heartbeat, Heartbeats
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode
@@ -279,6 +279,12 @@ def test_one_that_has_just_come_is_not_silent_as_the_one_before_it(node: tuple[A
     assert heartbeats.quiet(["/plant"], time.monotonic()) == []  # whom DDS lists by now is another one
     heartbeats.end("")
     end_nodes(waiting)
+
+
+@pytest.mark.parametrize("process", ["", " ", "\t1", "1", "1 2 3", "x y", "../self 1"])
+def test_a_process_that_this_machine_does_not_have_is_not_running(process: str) -> None:
+    """Anybody can send a heartbeat with any words."""
+    assert not Heartbeat("/plant", "first", [], "", process, ready=True).runs
 
 
 @pytest.mark.thorough

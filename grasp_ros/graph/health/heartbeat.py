@@ -58,7 +58,7 @@ class Heartbeat:
     @property
     def state(self) -> str:
         """State of the process in /proc; empty if this machine does not have it."""
-        number = self.process.split()[0] if self.process else ""
+        number, _, _ = self.process.partition(" ")
         state, process = _process(number) if number.isdecimal() else ("", "")
         return state if process == self.process else ""
 
