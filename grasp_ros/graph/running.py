@@ -42,6 +42,8 @@ class Running:
         for side, reaction in self.reactions.items():
             if reaction not in REACTIONS:
                 raise Refused(f"{side}_on_timeout: {reaction!r} is not allowed; allowed: {', '.join(REACTIONS)}")
+        if self.timeouts.keys() != self.reactions.keys():
+            raise Refused("timeouts, reactions: not of the same sides")
 
     @property
     def lockstep(self) -> bool:

@@ -88,7 +88,8 @@ def test_a_tag_in_a_text_is_not_followed(tmp_path: Path, tag: str) -> None:
 
 @pytest.mark.parametrize(
     "text", ["[" * 100_000, "mode: &a [*a]", "mode: x\naccuracy: y", "mode: x\nreactions: [1]", "- 1", "",
-             "mode: x\nz: 1", "mode: lockstep\naccuracy: 1.0\n", "a" * 2_000_000],
+             "mode: x\nz: 1", "mode: lockstep\naccuracy: 1.0\n", "a" * 2_000_000,
+             "mode: x\nreal_time_factor: 1.0\ntimeouts: {left: 0.1}\n", "mode: x\nreactions: {left: zero}\n"],
 )
 def test_a_text_on_run_that_no_plant_says_is_refused(text: str) -> None:
     with pytest.raises(Refused, match=r"^(run: not what a plant says|accuracy)"):
