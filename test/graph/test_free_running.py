@@ -86,7 +86,7 @@ def test_who_has_sent_a_first_command_is_not_waited_for(context: rclpy.Context) 
     plant = Plant(context=context, parameter_overrides=[Parameter(name, value=own) for name, own in given.items()])
     left, right = plant.scene.controllers.values()
     plant.loop._on_command("left", left, force_message(0, 1.0))
-    assert [(need.topic, need.due) for need in plant.needs()] == [(left, math.inf), (right, plant.asked)]
+    assert [(need.topic, need.due) for need in plant.needs()] == [(left, math.inf), (right, plant.published_at)]
     end_nodes(plant)
 
 
@@ -96,7 +96,7 @@ def test_a_free_run_begins_when_its_monitor_has_heard_all_controllers(context: r
     given = {"scene": "case_01", "free_running": True, "wait_for_controllers": True, "wait_for_monitor": monitored}
     plant = Plant(context=context, parameter_overrides=[Parameter(name, value=own) for name, own in given.items()])
     peer, sides = PeerNode("left_controller", context=context), plant.scene.controllers
-    plant.asked = 1.0  # when its first state was published, in s
+    plant.published_at = 1.0  # when its first state was published, in s
     executor = SingleThreadedExecutor(context=context)
     for node in (plant, peer):
         executor.add_node(node)
@@ -110,7 +110,7 @@ def test_a_free_run_begins_when_its_monitor_has_heard_all_controllers(context: r
             plant.loop._on_command(side, topic, force_message(0, 1.0))
         waits = monitored and not heard
         assert plant.loop.missing() == ([topic.name for topic in sides.values()] if waits else [])
-        assert any(need.due == plant.asked for need in plant.needs()) is waits  # so that it does not wait for ever
+        assert any(need.due == plant.published_at for need in plant.needs()) is waits  # not for ever
     executor.shutdown()
     end_nodes(plant, peer)
 

@@ -65,7 +65,7 @@ def test_a_law_that_does_not_return_has_longer(monkeypatch: Any, capsys: Any) ->
     assert clock.ended
     assert f" s: in {watchdog.__file__}, line " in capsys.readouterr().err  # where the thread of the nodes is
     clock.most = None
-    clock.dog.seen()
+    clock.dog.feed()
     clock.ended.clear()
     clock.beat(1000)
     assert not clock.ended

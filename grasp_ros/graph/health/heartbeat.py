@@ -154,8 +154,8 @@ class Heartbeats:
         heard = {beat.node: beat.heard for beat in self.alive}
         return [name for name in dict.fromkeys(names) if heard.get(name, limit) < limit]
 
-    def vouched(self, name: str) -> Heartbeat | None:
-        """Who says a text, by its digest; None if nobody does."""
+    def sender_of(self, name: str) -> Heartbeat | None:
+        """Of the process that publishes a text, by its digest; None if there is none."""
         return next((beat for beat in self.alive if name in beat.texts), None)
 
     def frozen(self) -> list[str]:

@@ -22,7 +22,7 @@ LOOK_SECONDS = 0.25
 STILL_SECONDS = 1.0  # between two looks: this thread was busy
 GONE_SECONDS = 0.7  # without a source: its last messages are on the way
 SLOW = 4  # times longer who shows that it lives may take
-MOST_TEXTS = 8  # of a topic, that wait for somebody to vouch for them
+MOST_TEXTS = 8  # of a topic, whose digest no heartbeat has yet
 
 
 class Need(NamedTuple):
@@ -68,7 +68,7 @@ class PeerNode(GraspNode):
         self._taken: dict[Topic, tuple[str, str]] = {}  # digest, and who said it
         self.counters.update({"silent peers": 0, "refused texts": 0, "second sources": 0})
         self._watchdog = Watchdog(
-            self.get_name(), self.patience, self.standing, self._ends, lambda: self.heartbeats.frozen()
+            self.get_name(), self.patience, self.blocking_limit, self._ends, lambda: self.heartbeats.frozen()
         )
         self.heartbeats = Heartbeats(self, self.heard, self._watchdog.beat)
         self._looked = time.monotonic()
@@ -80,7 +80,7 @@ class PeerNode(GraspNode):
     def needs(self) -> Iterator[Need]:
         """What this node needs of others now that it has begun."""
 
-    def standing(self) -> float | None:
+    def blocking_limit(self) -> float | None:
         """Time in s that its thread may be blocked, as by a law that does not return; None: any, before it begins."""
         return self.start_patience if self.begun else None
 
@@ -100,9 +100,9 @@ class PeerNode(GraspNode):
         if self._watchdog.stopped:  # its thread looks first
             return
         now = time.monotonic()
-        stood, self._watchdog.stood = self._watchdog.stood, 0.0
-        if stood and self.begun and not self.finished:
-            self.get_logger().warning(f"this node was suspended for {stood:.1f} s")
+        seconds, self._watchdog.suspended_for = self._watchdog.suspended_for, 0.0
+        if seconds and self.begun and not self.finished:
+            self.get_logger().warning(f"this node was suspended for {seconds:.1f} s")
         if not self._first_look:
             self._first_look = now
             self.heartbeats.own.ready = True
@@ -110,7 +110,7 @@ class PeerNode(GraspNode):
         if progress == self._before or now - self._looked > STILL_SECONDS:  # what others did may wait here
             self.sweep()
         self._before, self._looked = progress, now
-        self._watchdog.seen()
+        self._watchdog.feed()
         self.heard()
         if self.finished:
             return
@@ -213,11 +213,11 @@ class PeerNode(GraspNode):
         self.heard()
 
     def heard(self) -> None:
-        """Take the texts that somebody vouches for by now, and refuse those that have waited in vain."""
+        """Take the texts whose digest a heartbeat has by now; refuse those that have waited in vain."""
         for entry in tuple(self._texts):
             when, topic, text, take = entry
             name = digest(text)
-            beat = self.heartbeats.vouched(name)
+            beat = self.heartbeats.sender_of(name)
             if beat is None and (time.monotonic() - when < self.patience or self._has_ended(topic)):
                 continue
             self._texts.remove(entry)
@@ -228,11 +228,11 @@ class PeerNode(GraspNode):
                 take(text)
 
     def _has_ended(self, topic: Topic) -> bool:
-        """Whether a source of a topic has just ended, so that nobody vouches for its texts any more."""
+        """Whether a source of a topic has just ended: no heartbeat has the digests of its texts any more."""
         return any(beat.ended for beat in self.heartbeats.of(self.sources(topic)))
 
     def _is_foreign(self, topic: Topic) -> bool:
-        """Whether a text may be that of a plant of another make: nobody vouches for any, and states come from there."""
+        """Whether a text may be of a plant of another make: no heartbeat has any digest, and it publishes states."""
         names = set(self.sources(topic))
         return bool(names) and names <= {*self.sources(JOINT_STATES)} and not any(
             beat.texts for beat in self.heartbeats.alive

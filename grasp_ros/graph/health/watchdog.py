@@ -28,21 +28,21 @@ class Watchdog:
     A process that is stopped just while it holds a lock of shared memory stops those that wait for the lock as well, in
     the middle of a call of DDS. So the sentence goes to the terminal alone: a log of ROS goes through DDS.
 
-    It may be blocked for `standing()` s, None: for ever; for `patience` s while a node of this machine is suspended,
+    It may be blocked for `limit()` s, None: without end; for `patience` s while a node of this machine is suspended,
     which `frozen` names. After that the process ends, if `ends`.
     """
 
     def __init__(
-        self, name: str, patience: float, standing: Callable[[], float | None], ends: bool,
+        self, name: str, patience: float, limit: Callable[[], float | None], ends: bool,
         frozen: Callable[[], list[str]],
     ) -> None:
-        self._name, self._patience, self._standing, self._ends = name, patience, standing, ends
+        self._name, self._patience, self._limit, self._ends = name, patience, limit, ends
         self._frozen, self._beaten = frozen, time.monotonic()
         self.resumed = self._beaten  # when it last went on after a stop of its own
-        self.stood = 0.0  # how long that took, s, until the node has said it
-        self.seen()
+        self.suspended_for = 0.0  # how long that took, s, until the node has said it
+        self.feed()
 
-    def seen(self) -> None:
+    def feed(self) -> None:
         """The nodes' thread goes on."""
         self._since, self._said = time.monotonic(), -math.inf
 
@@ -54,10 +54,10 @@ class Watchdog:
     def beat(self) -> None:
         """Look; called every HEARTBEAT_SECONDS."""
         before, self._beaten = self._beaten, time.monotonic()
-        if self._beaten - before > PAUSE_SECONDS:  # nobody stood meanwhile
+        if self._beaten - before > PAUSE_SECONDS:  # the nodes' thread was not blocked meanwhile
             self._since = self.resumed = self._beaten
-            self.stood = self._beaten - before
-        seconds, most = self._beaten - self._since, self._standing()
+            self.suspended_for = self._beaten - before
+        seconds, most = self._beaten - self._since, self._limit()
         if most is None or seconds <= self._patience:
             return
         frozen = " and ".join(self._frozen())

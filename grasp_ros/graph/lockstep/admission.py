@@ -1,6 +1,6 @@
 """What a plant and a monitor admit: commands that can be true, of a source that is known, up to where the monitor is.
 
-A message does not name its sender. But a reader knows how many writers it has ever been connected with,
+A message does not name its sender. But a reader knows how many writers it has been connected with so far,
 and a writer is connected before its first message comes. So while that number is constant, all messages come from the
 same source; a message just after a change may come from another one, even from one that has already left.
 """
@@ -64,7 +64,7 @@ class Sources:
                 subscription.handle, QoSSubscriptionEventType.RCL_SUBSCRIPTION_MATCHED
             )
         self._seconds, self._until = seconds, 0.0
-        self._ever, self.now = -1, 0  # how many there have been, and how many there are
+        self._total, self.number = -1, 0  # connected so far, and now
 
     def begin(self) -> None:
         """Take those that are there as known."""
@@ -73,9 +73,9 @@ class Sources:
 
     def settled(self) -> bool:
         """Whether it has been the same ones for a while."""
-        now, before = time.monotonic(), self._ever
+        now, before = time.monotonic(), self._total
         self._look()
-        if before not in (-1, self._ever):
+        if before not in (-1, self._total):
             self._until = now + self._seconds
         return now >= self._until
 
@@ -83,4 +83,4 @@ class Sources:
         with self._matches:
             status = self._matches.take_event()
         if status is not None:
-            self._ever, self.now = status.total_count, status.current_count
+            self._total, self.number = status.total_count, status.current_count

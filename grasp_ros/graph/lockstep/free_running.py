@@ -49,7 +49,7 @@ class Held:
     # Tick of the state that it answers, from which its age counts; that of its arrival where it carries no stamp.
     answers: int = 0
     late: bool = False  # whether it is older than the timeout
-    ever: bool = False  # whether one has come
+    received: bool = False  # whether one has come
 
 
 class FreeRunning:
@@ -85,10 +85,10 @@ class FreeRunning:
         """The monitor, and first commands where it waits for them; later ones have timeouts of their own."""
         if self._awaits:
             for topic, held in zip(self._plant.scene.controllers.values(), self._held.values(), strict=True):
-                due = math.inf if held.ever else self._plant.asked
+                due = math.inf if held.received else self._plant.published_at
                 yield Need(topic, "first command", due, first=True, replaceable=True)
         if self._plant.monitored:
-            due = self._plant.asked if self._awaits and self.answered else math.inf
+            due = self._plant.published_at if self._awaits and self.answered else math.inf
             yield Need(LYAPUNOV, "sign of having had a command of each side", due, first=True)
 
     def ask_again(self, now: float) -> None:
@@ -112,8 +112,8 @@ class FreeRunning:
         elif not held.answers <= tick <= plant.tick:
             plant.count("stale commands")
         elif self._limits.admit(topic, force):
-            held.force, held.answers, held.ever = force, tick, True
-            self.answered = self.answered or all(own.ever for own in self._held.values())
+            held.force, held.answers, held.received = force, tick, True
+            self.answered = self.answered or all(own.received for own in self._held.values())
             self._awaits = self._awaits and not (self.answered and self._heard)
             self.advance()
 
@@ -140,7 +140,7 @@ class FreeRunning:
                 if not self._steering.go_on():
                     break
                 self._step()
-        if self._steering.stands or self._steering.steps:
+        if self._steering.halted or self._steering.steps:
             self._timing.pause()
             self._set_anchor()
             return
@@ -169,7 +169,7 @@ class FreeRunning:
     def _waits(self, now: float) -> bool:
         """Whether a controller that keeps up is about to answer the current state."""
         tick = self._plant.tick
-        return now - self._plant.asked < GRACE * self._period and any(
+        return now - self._plant.published_at < GRACE * self._period and any(
             0 < tick - held.answers <= KEEPS_UP and not held.late for held in self._held.values()
         )
 
@@ -225,7 +225,7 @@ class Timing:
         self._overruns += late > self._period
 
     def pause(self) -> None:
-        """The plant stands, as it was told to."""
+        """The plant is paused: the interval until it goes on is not one of its periods."""
         self._before = math.nan
 
     def age(self, side: str, periods: int, timed_out: bool) -> None:

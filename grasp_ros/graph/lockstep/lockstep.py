@@ -59,7 +59,7 @@ class Lockstep:
         return [*filter(None, map(self._plant.missing, self.topics))]
 
     def start(self) -> None:
-        """Go on without a command where none will ever come."""
+        """Go on without a command where none will come."""
         if not self.topics:
             self._timer = self._plant.wall_timer(UNCONTROLLED_SECONDS, self.advance)
 
@@ -72,16 +72,16 @@ class Lockstep:
         refused = plant.counters["refused commands"] or plant.counters["commands beyond a limit"]
         what = f"answer{' that is allowed' if refused else ''} to tick {plant.tick}"
         for topic, side in zip(self.topics, plant.scene.system.laws, strict=True):
-            due = math.inf if side in self._commands or topic in self._unsettled else plant.asked
+            due = math.inf if side in self._commands or topic in self._unsettled else plant.published_at
             yield Need(topic, what, due, first=not self.answered, replaceable=True)
         if plant.monitored:
-            due = max(plant.asked, plant.heard_of_record) if self._complete and self._ahead else math.inf
+            due = max(plant.published_at, plant.recorded_at) if self._complete and self._ahead else math.inf
             yield Need(LYAPUNOV, what, due)
 
     def ask_again(self, now: float) -> None:
         """Publish the current state again if nothing has come of it for a while: it, or an answer, was lost."""
         patience = REPEAT_SECONDS if self.answered else FIRST_SECONDS
-        since = max(self._plant.asked, self._asked, self._plant.heard_of_record if self._complete else 0.0)
+        since = max(self._plant.published_at, self._asked, self._plant.recorded_at if self._complete else 0.0)
         if self._unsettled:
             self._settle(now)
         elif (self._ahead or not self._complete) and now - since > patience:
@@ -106,7 +106,7 @@ class Lockstep:
 
     def _alone(self, topic: Topic) -> bool:
         """Whether one source is left, or what DDS still lists beside it is known to be dead."""
-        number = self._sources[topic].now
+        number = self._sources[topic].number
         return number < 2 or (len(self._plant.sources(topic)) >= number and len(self._plant.living(topic)) < 2)
 
     @property
@@ -138,7 +138,7 @@ class Lockstep:
         """Do what is due once the current state has been answered: reset, finish, pause or advance."""
         plant = self._plant
         resetting, ahead = self._steering.reset_due, self._ahead
-        going = not ahead and (resetting or not self._steering.stands)
+        going = not ahead and (resetting or not self._steering.halted)
         if self._timer is not None and going is self._timer.is_canceled():  # it would keep others from their turn
             (self._timer.reset if going else self._timer.cancel)()
         if not plant.begun or plant.finished or ahead or not self._complete:

@@ -52,7 +52,7 @@ class Steering:
         return True
 
     @property
-    def stands(self) -> bool:
+    def halted(self) -> bool:
         """Whether the plant is paused without steps to go."""
         return self._paused and not self.steps
 

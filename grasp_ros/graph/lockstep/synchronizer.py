@@ -146,10 +146,10 @@ class Synchronizer:
 
     def _decide(self, topic: Topic, there: Sequence[bytes], time_ns: int, late: bool) -> tuple[bytes | None, bool]:
         """The command that acted, and whether it was made from the effort, as nobody sent it here."""
-        told_ns = time_ns + self._wait * self._period_ns  # stamp of the state that has its force
-        if len(self._states) <= self._wait or (later := self._states[self._wait][1]).time_ns != told_ns:
+        effort_ns = time_ns + self._wait * self._period_ns  # stamp of the state that has its force
+        if len(self._states) <= self._wait or (later := self._states[self._wait][1]).time_ns != effort_ns:
             # It is still to come, or it was reset before, or no plant may be so far ahead.
-            to_come = len(self._states) <= self._wait < WINDOW and told_ns <= self.end_ns
+            to_come = len(self._states) <= self._wait < WINDOW and effort_ns <= self.end_ns
             return (there[-1] if there and late and not to_come else None), False
         force = later.inputs[ARMS[topic]]
         for cdr in there:

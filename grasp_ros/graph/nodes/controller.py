@@ -72,9 +72,9 @@ class Controller(PeerNode):
         """The plant; a monitor is the plant's need."""
         yield Need(JOINT_STATES)
 
-    def standing(self) -> float | None:
+    def blocking_limit(self) -> float | None:
         """An import that does not return, or asks at a terminal, has as long as a node that does not come."""
-        return self.start_patience if self._is_loading else super().standing()
+        return self.start_patience if self._is_loading else super().blocking_limit()
 
     def progress(self) -> object:
         """The last state answered."""

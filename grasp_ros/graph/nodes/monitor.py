@@ -112,7 +112,7 @@ class Monitor(PeerNode):
 
     def _on_scene(self, text: str) -> None:
         if self._scene is None:  # one run, one scene
-            beat = self.heartbeats.vouched(digest(text))
+            beat = self.heartbeats.sender_of(digest(text))
             self._plant = beat.identity if beat else ""
             self._scene = scenes.parse(text, topics.SCENE.name, f"topic {topics.SCENE.name}")
             self._begin()
@@ -172,14 +172,15 @@ class Monitor(PeerNode):
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
         sources = self._sources.get(topic)  # of commands: is this one nobody else's?
-        sure = sources is None or (sources.settled() and sources.now < 2 and (command := raw_command(cdr)) is not None
+        sure = sources is None or (sources.settled() and sources.number < 2
+                                   and (command := raw_command(cdr)) is not None
                                    and self._limits.allow(topic, command[1]))
         arrival = self._synchronizer.put(topic, cdr, sure)
         if arrival is Arrival.TAKEN:
             self._drain()
         elif arrival is Arrival.AGAIN:
             self.count(arrival.value)
-            if not self._begins():  # what was published has been lost
+            if not self._awaits_laws():  # what was published has been lost
                 self._complete()
                 self._output.publish(self._published)
         elif arrival is Arrival.REPEATED:
@@ -220,10 +221,10 @@ class Monitor(PeerNode):
 
     def _let_wait(self) -> None:
         """Let ticks wait for others for a while."""
-        if self._due and self._soon.is_canceled() and not self._begins():
+        if self._due and self._soon.is_canceled() and not self._awaits_laws():
             self._soon.reset()
 
-    def _begins(self) -> bool:
+    def _awaits_laws(self) -> bool:
         """Whether the first state of a free run waits for its laws, which are announced before the first commands."""
         unheard = {topic.name for topic in self._commands} - {*self.heartbeats.own.hears}
         return not self.counters["ticks"] and len(self._due) < 2 and bool(unheard)
@@ -245,7 +246,7 @@ class Monitor(PeerNode):
             own = self._published = self._template.fill(tick.time_ns, values)
             self._recorder.write_tick(bag_ns, [*beside, *tick.found.items(), (topics.LYAPUNOV, own)], tick.time_ns)
             self._output.publish(own)
-            self._heed(tick, named(values))
+            self._check_energy(tick, named(values))
             self._at_end = tick.time_ns == self._synchronizer.end_ns
             self.finished = bool(self.exit_code) or self._is_over()
             if self.finished:
@@ -254,7 +255,7 @@ class Monitor(PeerNode):
     def _is_over(self) -> bool:
         return self._at_end and all(beat.identity != self._plant for beat in self.heartbeats.alive)
 
-    def _heed(self, tick: Tick, values: Mapping[str, float]) -> None:
+    def _check_energy(self, tick: Tick, values: Mapping[str, float]) -> None:
         """Say why V is not there; end where energy comes from nowhere."""
         if not values["closed"]:
             self.count("ticks without V")

@@ -53,8 +53,8 @@ class Plant(PeerNode):
         self._plant = self._new_plant()
         self._state_template = template_of(JOINT_STATES, [NAMES[body] for body in self.scene.system.present])
         self._clock_template = template_of(CLOCK)
-        self.resets, self.asked = 0, math.inf  # how often it was put back; wall time of the current state
-        self._recorded, self.heard_of_record = -1, -math.inf  # last tick that the monitor has; wall time of its word
+        self.resets, self.published_at = 0, math.inf  # wall time of the current state, s
+        self._recorded, self.recorded_at = -1, -math.inf  # last tick that the monitor has; when it said so
         self._begin = math.nan  # wall time of the first state
         self.counters["refused records"] = 0
         self._shown = ExitStack()
@@ -108,7 +108,7 @@ class Plant(PeerNode):
         tick, rest = divmod(stamp, self.scene.period_ns)
         newest = 0 if self.resets and self._recorded < 0 else self.tick  # others are of the time before a reset
         if not rest and max(self._recorded, 0) <= tick <= newest:
-            self._recorded, self.heard_of_record = tick, time.monotonic()
+            self._recorded, self.recorded_at = tick, time.monotonic()
             self.loop.advance()
         elif rest or not self.resets:
             self.refuse("refused records", LYAPUNOV)
@@ -124,9 +124,9 @@ class Plant(PeerNode):
         """Of its loop: controllers and monitor."""
         return self.loop.needs()
 
-    def standing(self) -> float | None:
+    def blocking_limit(self) -> float | None:
         """In one process the laws are in this thread: as long as an answer of another process may take."""
-        return SLOW * self.patience if self.begun and self.loop.answered else super().standing()
+        return SLOW * self.patience if self.begun and self.loop.answered else super().blocking_limit()
 
     def progress(self) -> object:
         """Its time."""
@@ -153,8 +153,8 @@ class Plant(PeerNode):
         monitor = [LYAPUNOV] if self.monitored else []
         missing += [] if self.linked(self._states, monitor) else [LYAPUNOV.name]
         if missing:
-            misfits = self.misfits(self.scene.controllers.values())
-            self.words = "; ".join((f"waiting for {', '.join(missing)}", *misfits))
+            incompatible = self.incompatible(self.scene.controllers.values())
+            self.words = "; ".join((f"waiting for {', '.join(missing)}", *incompatible))
         else:
             deaf = [topic.name for topic in self.loop.topics if not self.linked(self._states, [topic])]
             self.words = (f"waiting for publishers of {' and '.join(deaf) or 'a command'} to subscribe to"
@@ -169,14 +169,14 @@ class Plant(PeerNode):
     def _start(self) -> None:
         self.phase, self.words = Phase.RUNNING, "running"
         self.begun, self.concern = True, ""
-        self.heartbeats.tell()  # this plant vouches for its scene
+        self.heartbeats.tell()  # with the digests of its texts
         self._begin = time.monotonic()
         self.publish_state()
         self.loop.start()
 
     def publish_state(self) -> None:
         """Send the state of the current tick and what belongs to it."""
-        self.asked = time.monotonic()
+        self.published_at = time.monotonic()
         self.repeat()
 
     def repeat(self) -> None:

@@ -45,7 +45,7 @@ class Phase(Enum):
     FAILED = "failed"
 
 
-def _fits(writer: TopicEndpointInfo, topic: Topic) -> bool:
+def _is_compatible(writer: TopicEndpointInfo, topic: Topic) -> bool:
     """Whether a reader of a topic is connected with a publisher: by the type and the quality of service."""
     connects = messages.connects(writer.qos_profile, messages.reader_qos(topic))
     return bool(writer.topic_type == topic.type and connects)
@@ -113,14 +113,14 @@ class GraspNode(ParameterNode):
 
     def writers(self, topic: Topic) -> list[TopicEndpointInfo]:
         """Publishers that a reader of a topic is connected with; not those of another type or quality of service."""
-        return [writer for writer in self.get_publishers_info_by_topic(topic.name) if _fits(writer, topic)]
+        return [writer for writer in self.get_publishers_info_by_topic(topic.name) if _is_compatible(writer, topic)]
 
-    def misfits(self, topics: Iterable[Topic]) -> list[str]:
+    def incompatible(self, topics: Iterable[Topic]) -> list[str]:
         """Publishers that no reader of these topics is connected with, in words."""
         return [f"not connected: {writer.node_name}, whose {topic.name} is {writer.topic_type},"
                 f" {writer.qos_profile.reliability.name.lower()}; needed: {topic.type}, reliable"
                 for topic in topics for writer in self.get_publishers_info_by_topic(topic.name)
-                if not _fits(writer, topic)]
+                if not _is_compatible(writer, topic)]
 
     def readers(self, publisher: Publisher) -> list[TopicEndpointInfo]:
         """Subscriptions that a publisher is connected with, as soon as discovery is through."""
@@ -206,7 +206,7 @@ class GraspNode(ParameterNode):
             yield found[0]
 
     def take_waiting(self, subscriptions: Iterable[Subscription], most: int = SWEEP) -> None:
-        """Take the messages that the executor has not been told of, in the order in which the subscriptions were made.
+        """Take the messages that the executor has not noticed, in the order in which the subscriptions were made.
 
         Between looking for messages and listening for them, rmw_fastrtps is deaf for a moment: the first message of a
         topic can lie there until the second comes. The last subscription is looked at first: whoever sends a command
@@ -218,7 +218,7 @@ class GraspNode(ParameterNode):
                 subscription.callback(message)
 
     def sweep(self) -> None:
-        """Take messages and requests that the executor has not been told of."""
+        """Take messages and requests that the executor has not noticed."""
         self.take_waiting(self.subscriptions)
         for service in tuple(self.services):
             with service.handle:
