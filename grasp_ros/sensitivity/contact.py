@@ -14,12 +14,13 @@ from grasp_ros.exact.compilation.vectors import HALF, add_product, highest, larg
 from grasp_ros.exact.numerics.polynomial import INVERSE
 from grasp_ros.exact.records import Array
 from grasp_ros.physics.impact_law import EXPONENT
-from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Of, Pair, U, V, X, Z
-from grasp_ros.sensitivity.tangents import AHEAD, BLOCK, ODD, STATES, STEP, SUMS, WEIGHTS, Row, Tangents, Weight
+from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Of, Pair, V, X, Z
+from grasp_ros.sensitivity.tangents import AHEAD, BLOCK, STATES, STEP, WEIGHTS, Row, Tangents, Weight
 
 MOST_HALVINGS = 200
 NEGLECTED = 4096.0 * EPS  # 1e-12 for a step; one digit more costs 5 %, as more steps are made in parts
 FIRST = 6  # terms of a series, one of which is about its size
+Sums = tuple[Array, Array, Array, Array]  # of a pair, times dt/ds: x and v of the arm, v of the object, impact force
 
 
 @kernel
@@ -116,110 +117,100 @@ def apart(side: Body, arm: Array, middle: Array) -> Array:
 
 
 @inlined
-def sum_products(t: Tangents, block: int, k: int, side: Body, alone: bool) -> None:
+def sum_products(t: Tangents, block: int, k: int, side: Body) -> tuple[Sums, Sums]:
     """Sum the products of series for coefficients k and k + 1 that a pair in contact brings, of four directions.
 
-    They are x and v of the arm and v of the object times dt/ds, and what the changes of u and u' make of the impact.
-    Two orders share what they take from memory, which is what takes the time; a product with the newest coefficient is
-    left to `add_newest`.
+    Two orders share what they take from memory, which is what takes the time; the product with coefficient k + 1, which
+    is not known yet, is left to `add_newest`.
     """
     f, weights, i, arm = t.series, t.weights, BLOCK * block, HALF * velocity_lane(side)
     to_slope, to_drag = WEIGHTS * (Weight.SLOPE + side), WEIGHTS * (Weight.DRAG + side)
     x_0 = v_0 = o_0 = slope_0 = drag_0 = x_1 = v_1 = o_1 = slope_1 = drag_1 = spread_half(0.0)
     for m in range(HALF * k, -1, -HALF):
         pace, later = load_half(weights, m), load_half(weights, m + HALF)
-        x, v, middle = load_half(f, i + arm - HALF), load_half(f, i + arm), load_half(f, i + HALF * V.O)
+        x, v, v_o = load_half(f, i + arm - HALF), load_half(f, i + arm), load_half(f, i + HALF * V.O)
         x_0, x_1 = add_product(x_0, x, pace), add_product(x_1, x, later)
         v_0, v_1 = add_product(v_0, v, pace), add_product(v_1, v, later)
-        if alone:
-            o_0, o_1 = add_product(o_0, middle, pace), add_product(o_1, middle, later)
-        u, rate = apart(side, x, load_half(f, i + HALF * X.O)), apart(side, v, middle)
+        o_0, o_1 = add_product(o_0, v_o, pace), add_product(o_1, v_o, later)
+        u, rate = apart(side, x, load_half(f, i + HALF * X.O)), apart(side, v, v_o)
         slope_0 = add_product(slope_0, u, load_half(weights, to_slope + m))
         slope_1 = add_product(slope_1, u, load_half(weights, to_slope + m + HALF))
         drag_0 = add_product(drag_0, rate, load_half(weights, to_drag + m))
         drag_1 = add_product(drag_1, rate, load_half(weights, to_drag + m + HALF))
         i += STEP
-    store_sums(t.sums, SUMS * block, side, alone, (x_0, v_0, o_0, slope_0 + drag_0))
-    store_sums(t.sums, SUMS * block + ODD, side, alone, (x_1, v_1, o_1, slope_1 + drag_1))
+    return (x_0, v_0, o_0, slope_0 + drag_0), (x_1, v_1, o_1, slope_1 + drag_1)
 
 
 @inlined
-def store_sums(sums: Array, first: int, side: Body, alone: bool, found: tuple[Array, Array, Array, Array]) -> None:
-    """Write sums of a pair; those of the object, too, where no other pair has done so."""
-    arm = first + HALF * velocity_lane(side)
-    store(sums, arm - HALF, found[0])
-    store(sums, arm, found[1])
-    if alone:
-        store(sums, first + HALF * V.O, found[2])
-    store(sums, first + HALF * (U.L + side), found[3])
-
-
-@inlined
-def add_newest(t: Tangents, block: int, k: int, side: Body, alone: bool) -> None:
-    """Add the products with the coefficients k of a pair, which have just been found, to the sums of odd order k."""
+def add_newest(t: Tangents, block: int, k: int, side: Body, sums: Sums) -> Sums:
+    """Sums of a pair for coefficient k with the products with the coefficients k, which have just been found."""
     f, weights, i, arm = t.series, t.weights, BLOCK * block + STEP * k, HALF * velocity_lane(side)
-    sums, first, pace = t.sums, SUMS * block + ODD, load_half(weights, 0)
-    x, v, middle = load_half(f, i + arm - HALF), load_half(f, i + arm), load_half(f, i + HALF * V.O)
-    slope = load_half(weights, WEIGHTS * (Weight.SLOPE + side))
+    pace, slope = load_half(weights, 0), load_half(weights, WEIGHTS * (Weight.SLOPE + side))
     drag = load_half(weights, WEIGHTS * (Weight.DRAG + side))
-    u, push = apart(side, x, load_half(f, i + HALF * X.O)), load_half(sums, first + HALF * (U.L + side))
-    store_sums(sums, first, side, alone, (
-        add_product(load_half(sums, first + arm - HALF), x, pace), add_product(load_half(sums, first + arm), v, pace),
-        add_product(load_half(sums, first + HALF * V.O), middle, pace),
-        add_product(add_product(push, u, slope), apart(side, v, middle), drag),
-    ))
+    x, v, v_o = load_half(f, i + arm - HALF), load_half(f, i + arm), load_half(f, i + HALF * V.O)
+    push = add_product(sums[3], apart(side, x, load_half(f, i + HALF * X.O)), slope)
+    return (add_product(sums[0], x, pace), add_product(sums[1], v, pace), add_product(sums[2], v_o, pace),
+            add_product(push, apart(side, v, v_o), drag))
 
 
 @inlined
-def impact(t: Tangents, block: int, k: int, side: Body) -> Array:
+def impact(t: Tangents, block: int, k: int, side: Body, total: Array) -> Array:
     """Coefficient k of the change of the impact force of a pair, times dt/ds."""
     law, first, rows = t.law[side], HALF * block, t.rows
-    total = load_half(t.sums, SUMS * block + ODD * (k % 2) + HALF * (U.L + side))
     total = add_product(total, load_half(law[Law.HERTZIAN], first), rows[Row.HERTZIAN + side, k])
     return add_product(total, load_half(law[Law.DISSIPATION], first), rows[Row.LOSS + side, k])
 
 
 @inlined
-def advance_body(t: Tangents, block: int, k: int, body: Body, push: Array) -> None:
-    """Write coefficient k + 1 of a body under coefficient k of the change of the impacts on it."""
-    rows, row, own, v = t.rows, t.bodies[body], t.acting[body], velocity_lane(body)
+def advance_body(t: Tangents, block: int, k: int, body: Body, x: Array, v: Array, push: Array) -> None:
+    """Write coefficient k + 1 of a body, from those of its x and v times dt/ds and of the impacts on it."""
+    rows, row, own = t.rows, t.bodies[body], t.acting[body]
     share, inverse, first = INVERSE[k + 1], 1.0 / row[Of.MASS], HALF * block
-    place = SUMS * block + ODD * (k % 2) + HALF * v
-    x, moved = load_half(t.sums, place - HALF), load_half(t.sums, place)
     driven = rows[Row.PACE, k] * load_half(own[Of.FORCE], first)
     driven = driven - rows[Row.GAIN + body, k] * load_half(own[Of.MASS], first)
     slowed = rows[Row.WAY + body, k] * load_half(own[Of.STIFFNESS], first)
     slowed = slowed + rows[Row.SPEED + body, k] * load_half(own[Of.DAMPING], first)
-    held = row[Of.STIFFNESS] * inverse * x + row[Of.DAMPING] * inverse * moved
-    place = BLOCK * block + STEP * (k + 1) + HALF * (v - 1)
-    store(t.series, place, share * moved)
+    held = row[Of.STIFFNESS] * inverse * x + row[Of.DAMPING] * inverse * v
+    place = BLOCK * block + STEP * (k + 1) + HALF * (velocity_lane(body) - 1)
+    store(t.series, place, share * v)
     store(t.series, place + HALF, share * (inverse * (push + driven - slowed) - held))
+
+
+@inlined
+def advance(t: Tangents, block: int, k: int, of_left: Sums, of_right: Sums) -> None:
+    """Write coefficients k + 1 of the bodies in contact from the sums of the pairs for coefficients k."""
+    on_left = on_right = v_o = nothing = spread_half(0.0)
+    if touches(t, LEFT):
+        x, v, v_o, push = of_left
+        on_left = impact(t, block, k, LEFT, push)
+        advance_body(t, block, k, LEFT, x, v, nothing - on_left)
+    if touches(t, RIGHT):
+        x, v, v_o, push = of_right
+        on_right = impact(t, block, k, RIGHT, push)
+        advance_body(t, block, k, RIGHT, x, v, on_right)
+    advance_body(t, block, k, OBJECT, nothing, v_o, on_left - on_right)  # no spring holds it
 
 
 @kernel
 def expand_tangents(t: Tangents, n: int) -> None:
     """Write the series of the tangents over a Taylor step of even degree n."""
     base_series(t, n)
-    left, right, nothing = touches(t, LEFT), touches(t, RIGHT), spread_half(0.0)
-    blocks = t.x.shape[1] // HALF
-    for block in range(blocks):
+    nothing = spread_half(0.0)
+    for block in range(t.x.shape[1] // HALF):
         for lane in range(STATES):
             store(t.series, BLOCK * block + HALF * lane, load_half(t.x[lane], HALF * block))
-    for k in range(n):
-        for block in range(blocks):  # within: while one waits for its newest coefficient, the next one sums
-            on_l = on_r = nothing
-            for side in (LEFT, RIGHT):
-                if touches(t, side) and k % 2 == 0:
-                    sum_products(t, block, k, side, side == LEFT or not left)
-                elif touches(t, side):
-                    add_newest(t, block, k, side, side == LEFT or not left)
-            if left:
-                on_l = impact(t, block, k, LEFT)
-                advance_body(t, block, k, LEFT, nothing - on_l)
-            if right:
-                on_r = impact(t, block, k, RIGHT)
-                advance_body(t, block, k, RIGHT, on_r)
-            advance_body(t, block, k, OBJECT, on_l - on_r)
+        for k in range(0, n, 2):
+            left_0 = left_1 = right_0 = right_1 = (nothing, nothing, nothing, nothing)
+            if touches(t, LEFT):
+                left_0, left_1 = sum_products(t, block, k, LEFT)
+            if touches(t, RIGHT):
+                right_0, right_1 = sum_products(t, block, k, RIGHT)
+            advance(t, block, k, left_0, right_0)
+            if touches(t, LEFT):
+                left_1 = add_newest(t, block, k + 1, LEFT, left_1)
+            if touches(t, RIGHT):
+                right_1 = add_newest(t, block, k + 1, RIGHT, right_1)
+            advance(t, block, k + 1, left_1, right_1)
 
 
 @kernel

@@ -21,15 +21,12 @@ from grasp_ros.exact.driver.workspace import zeros
 from grasp_ros.exact.records import Array, Integers, Plant, State, new_run
 from grasp_ros.physics.accuracy import FINEST
 from grasp_ros.physics.control import Column
-from grasp_ros.physics.layout import LANES
 from grasp_ros.sensitivity.directions import Directions, no_directions
 
 TERMS = higher_order(series_order(FINEST)) + 1  # of the longest series
 STATES = 6
 STEP = STATES * HALF  # numbers of one coefficient of all states, for HALF directions
 BLOCK = STEP * TERMS
-ODD = LANES * HALF  # sums of one coefficient: of the states, and of the two pairs
-SUMS = 2 * ODD  # of one of even order and of the next one
 WEIGHTS = HALF * TERMS
 FLOWS = 16 * HALF  # numbers of the flows of all bodies
 AHEAD = 8  # orders that `contact.multiply` finds at a time
@@ -120,7 +117,6 @@ class Tangents(NamedTuple):
     weights: Array  # (5 WEIGHTS,) of the run, see `Weight`
     factors: Array  # (2, ROOM)
     products: Array  # (3, ROOM) see `contact.pair_series`
-    sums: Array  # (N / HALF SUMS,) of products
     matrices: Array  # (5, 6, 6)
     flows: Array  # (FLOWS,) see `flight.Flow`
 
@@ -148,7 +144,7 @@ def tangents_of(plant: Plant, state: State, changes: Directions, times: Array, e
         np.zeros((1, 2, 2)), np.zeros((0, 2, n)), changes.external,
         counts, numbers, times[order], order, np.zeros((m, STATES, n)), np.zeros((e, 3, 2 + n)),
         zeros(wide // HALF * BLOCK), np.zeros((ROWS, TERMS)), zeros(5 * WEIGHTS), zeros(2, ROOM), zeros(3, ROOM),
-        zeros(wide // HALF * SUMS), np.zeros((5, STATES, STATES)), zeros(FLOWS))
+        np.zeros((5, STATES, STATES)), zeros(FLOWS))
 
 
 tangents_at = reader(typeof(tangents_of(*new_run()[2:], no_directions(1), np.zeros(0), 0)))
