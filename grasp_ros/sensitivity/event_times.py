@@ -49,16 +49,16 @@ def event_rates(scene: Scene, changes: Directions, sampled: bool, events: Array,
     change[stops], rate[stops] = moved[stops, COLUMN[OBJECT] + 1], gained[OBJECT, stops]
     slips = (kind == Transition.SLIP) & ~made
     if slips.any():
-        these = Moments(*(part[slips] for part in moments))
-        change[slips], rate[slips] = _excess(pairs, changes, these, gained[:, slips])
+        pushed, faster = _excess(pairs, changes, moments, gained)
+        change[slips], rate[slips] = pushed[slips], faster[slips]
     for side, sign in SIDES:
         ours = body == side
         touches = np.flatnonzero(ours & ((kind == Transition.TOUCH) | (kind == Transition.RELEASE)))
         change[touches], rate[touches] = closing(side, moved[touches])[0], closing(side, moments.state[touches])[1]
         clamps = np.flatnonzero(ours & ((kind == Transition.CLAMP) | (kind == Transition.REENTRY)))
         if len(clamps):  # u' + 1/p
-            loss, faster = pairs[side, Law.DISSIPATION], closing(side, moved[clamps])[1]
-            change[clamps] = faster - changes.pairs[side, Law.DISSIPATION] / loss**2
+            loss, speed = pairs[side, Law.DISSIPATION], closing(side, moved[clamps])[1]
+            change[clamps] = speed - changes.pairs[side, Law.DISSIPATION] / loss**2
             rate[clamps] = sign * (gained[side] - gained[OBJECT])[clamps]
     change[made], rate[made] = 0.0, -1.0
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -15,7 +15,7 @@ import math
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import door, kernel
 from grasp_ros.exact.driver.callback import FINISH, REST
-from grasp_ros.exact.driver.intervals import feedback
+from grasp_ros.exact.driver.intervals import feedback, measured
 from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, surface_factor
 from grasp_ros.exact.numerics.polynomial import invert_time
@@ -52,15 +52,14 @@ def answer(t: Tangents, side: Body, tick: int, j: int) -> tuple[float, bool]:
     answer.
     """
     row, rates, lane = t.control[side], t.control_rates[side], velocity_lane(side)
-    first, second = t.normals[min(tick, t.normals.shape[0] - 1), side]
-    x = t.before[lane - 1] + row[Column.POSITION_NOISE] * first
-    v = t.before[lane] + row[Column.VELOCITY_NOISE] * second
+    normals = t.normals[min(tick, t.normals.shape[0] - 1), side]
+    x, v = measured(row, normals, t.before[lane - 1], t.before[lane])
     force = feedback(row, x, v)
     limited = math.copysign(1.0, force) * rates[Column.LIMIT, j] if force != 0.0 else 0.0
     if abs(force) > row[Column.LIMIT] or row[Column.LIMIT] == 0.0:
         return limited, False
-    away = t.x[lane - 1, j] + rates[Column.POSITION_NOISE, j] * first - rates[Column.SET_POINT, j]
-    faster = t.x[lane, j] + rates[Column.VELOCITY_NOISE, j] * second
+    away = t.x[lane - 1, j] + rates[Column.POSITION_NOISE, j] * normals[0] - rates[Column.SET_POINT, j]
+    faster = t.x[lane, j] + rates[Column.VELOCITY_NOISE, j] * normals[1]
     free = (rates[Column.FEED_FORWARD, j] - row[Column.POSITION_GAIN] * away - row[Column.VELOCITY_GAIN] * faster
             - rates[Column.POSITION_GAIN, j] * (x - row[Column.SET_POINT]) - rates[Column.VELOCITY_GAIN, j] * v)
     return free, abs(force) == row[Column.LIMIT] and free != limited
@@ -97,7 +96,7 @@ def pass_friction(t: Tangents, at_tick: bool) -> None:
     """The jump of the tangents where the mode of an object under dry friction has changed: v_o times a factor.
 
     Where the object turns, that is its acceleration after the turn by that before it. It is nan where the one-sided
-    derivatives differ. Of an object that stops just when inputs change nobody knows which of them would act on it.
+    derivatives differ. Where an object stops just when inputs change, it is undecided which of them would act on it.
     """
     before, now, factor = t.counts[Count.SLIDE], t.mode[OBJECT], 1.0
     if now == Slide.FREE or now == before:
