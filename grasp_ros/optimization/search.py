@@ -88,7 +88,7 @@ class DesignProblem:
         outcomes: dict[str, Array] = {}
         for name, columns in self._columns.items():
             worst = np.fmax.reduce([table.columns[column.name] for column in columns])  # nan: an absent body
-            outcomes[name] = np.where(np.isnan(worst), np.inf, worst)  # what no run tells is as bad as can be
+            outcomes[name] = np.where(np.isnan(worst), np.inf, worst)  # a run without it is as bad as can be
         excess: Array = np.zeros(len(table.status))
         for bound in self.bounds:
             excess += np.maximum(outcomes[bound.outcome] - bound.most, 0.0) / (abs(bound.most) or 1.0)
@@ -208,26 +208,32 @@ def search(problem: DesignProblem, seed: int = 0, progress: Callback | None = No
     places = np.unique(np.vstack([found.x, ends, single]), axis=0)  # a population may stop just before an end
     reached = function(places.T)
     place, least = places[int(np.argmin(reached))], float(reached.min())
+    best = problem.numbers(place[None])
+    tried = problem.found(best)
     if least >= BROKEN:
-        wish = " and ".join(f"{bound.outcome} <= {bound.most:g}" for bound in problem.bounds)
-        nearest = problem.found(problem.numbers(place[None]))
-        shown = ", ".join(f"{name} {values[0]:.6g}" for name, values in nearest.outcomes.items())
-        finite = all(np.isfinite(values[0]) for values in nearest.outcomes.values())
-        why = f"; the nearest has {shown}" if finite else ""
-        if not finite and wanted_by(find(problem.names)) & Wanted.SETTLING:
-            why = f"; {problem.scene.why_unsettled(problem.setup.sampled)}; last_outside needs no proof"
+        wish = " and ".join(f"{name} <= {most:g}" for name, most in problem.bounds)
         raise Refused(f"{problem.scene.name}: none of {runs} choices has a finite {problem.minimise[0]}"
-                      + (f" with {wish}" if wish else "") + (f"; {nearest.stops[0]}" if nearest.stops else why))
+                      + (f" with {wish}" if wish else "") + _why_none(problem, tried))
     if worst - least <= AGREE * abs(least):
         raise Refused(f"{problem.scene.name}: nothing to choose: {problem.minimise[0]} is {least:.10g} for all of"
                       f" {runs} choices; allowed: numbers and ranges that change it")
-    best = problem.numbers(place[None])
-    outcomes = {name: float(values[0]) for name, values in problem.found(best).outcomes.items()}
+    outcomes = {name: float(values[0]) for name, values in tried.outcomes.items()}
     numbers = {key: float(values[0]) for key, values in best.items()}
     return Design(problem.scene.changed(numbers), numbers, outcomes, runs)
 
 
-def front(problem: DesignProblem, seed: int = 0, progress: Callback | None = None) -> list[Design]:
+def _why_none(problem: DesignProblem, nearest: Found) -> str:
+    """What keeps the choice that breaks the bounds least from being one."""
+    if nearest.stops:
+        return f"; {nearest.stops[0]}"
+    if all(np.isfinite(values[0]) for values in nearest.outcomes.values()):
+        return "; the nearest has " + ", ".join(f"{name} {value[0]:.6g}" for name, value in nearest.outcomes.items())
+    if wanted_by(find(problem.names)) & Wanted.SETTLING:
+        return f"; {problem.scene.why_unsettled(problem.setup.sampled)}; last_outside needs no proof"
+    return ""
+
+
+def front(problem: DesignProblem, seed: int = 0, progress: Told | None = None) -> list[Design]:
     """The Pareto front of the two outcomes of a problem, from the first outcome's best on.
 
     Each has the smallest first outcome for a bound on the second one; the bounds are even between the two ends. One
