@@ -50,7 +50,7 @@ class Measured(NamedTuple):
     state: Array  # (n, 6) m and m/s; NaN: a channel that is not measured
     inputs: Array | None  # (n - 1, 3) N by body, from each sample to the next
     sampled: bool  # whether commands are held over control periods
-    why_unknown: str = ""  # why the controllers of the scene do not tell what acted; empty if they do
+    why_unknown: str = ""  # why what acted does not follow from the controllers of the scene; empty if it does
 
     @property
     def acting(self) -> str:
@@ -105,9 +105,13 @@ def _of_recording(recording: Recording, by_sensors: bool) -> Measured:
         why = f"{len(recording.starts) - 1} resets" if len(recording.starts) > 1 else "not all ticks of its run"
         raise Refused(f"{name}: {why}; allowed: a bag of one run from its begin, with all of its ticks")
     others = [side for side, answers in answers_of(recording).items() if answers.differs]
-    why_unknown = "numbers were set while it ran" if recording.changes else (
-        "commands came by the wall clock" if not recording.running.lockstep else (
-            f"another law acted on the {' and the '.join(others)} arm" if others else ""))
+    why_unknown = ""
+    if recording.changes:
+        why_unknown = "numbers were set while it ran"
+    elif not recording.running.lockstep:
+        why_unknown = "commands came by the wall clock"
+    elif others:
+        why_unknown = f"another law acted on the {' and the '.join(others)} arm"
     state = recording.measured if by_sensors else recording.state
     return Measured(name, recording.scene, recording.t, state, recording.inputs[:-1], True, why_unknown)
 

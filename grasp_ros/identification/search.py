@@ -32,7 +32,7 @@ from grasp_ros.simulation.sampled_plant import SampledPlant, tick_of
 GROWTHS = (2.0, math.sqrt(2.0))  # of the horizon; the second where the first does not lead to a fit
 FIRST = 16.0  # part of the motion that is the first horizon
 GOOD = 4.0  # mean square of residuals, in those of the noise, above which a search has not found the motion
-FAR, PART = 10.0, 0.2  # of the scatter, and of the motion: residuals above both tell of another motion
+FAR, PART = 10.0, 0.2  # of the scatter, and of the motion: residuals above both are those of another motion
 ROUGH, FINE = 1e-3, 1e-6  # relative change of the sum of squares at which a search ends, on the way and at last
 SHORTEST = 1e-10  # step of y, relative
 MOST = 30  # motions of one horizon
@@ -64,24 +64,25 @@ class FitProblem(NamedTuple):
 
     def scene_at(self, y: Array) -> Scene:
         """The scene with the free numbers; outside its domain it is refused."""
-        free = zip(self.numbers, self.values(y).items(), strict=True)
-        return self.data.scene.changed({key: value for number, (key, value) in free if number.channel is None})
+        values = self.values(y)
+        return self.data.scene.changed(
+            {number.key: values[number.key] for number in self.numbers if number.channel is None})
 
     def predict(self, y: Array, rows: int) -> tuple[Array, Array, Array]:
         """What is measured of the motion (rows, 6), its derivatives by y (rows, 6, n), and its touches.
 
         Numbers outside the domain, and a run that does not get there, are refused.
         """
-        keys = [number.key for number in self.numbers if number.channel is None]
-        states, found, touches = motion(self.data, self.scene_at(y), keys, rows)
-        rates = np.zeros((*states.shape, len(y)))
         places = [place for place, number in enumerate(self.numbers) if number.channel is None]
+        keys = [self.numbers[place].key for place in places]
+        states, found, touches = motion(self.data, self.scene_at(y), keys, rows)
+        rates, values = np.zeros((*states.shape, len(y))), self.values(y)
         rates[:, :, places] = found
-        for place, (number, value) in enumerate(zip(self.numbers, self.values(y).values(), strict=True)):
+        for place, number in enumerate(self.numbers):
             if number.channel is not None:
-                states[:, number.channel] += value
+                states[:, number.channel] += values[number.key]
                 rates[:, number.channel, place] = 1.0
-            rates[:, :, place] *= number.slope(value)
+            rates[:, :, place] *= number.slope(values[number.key])
         return states, rates, touches
 
     def residuals(self, y: Array, rows: int) -> tuple[Array, Array]:
@@ -137,7 +138,7 @@ def refine(problem: FitProblem, begin: Array, rows: int, enough: float = FINE) -
         y = begin + np.frombuffer(step)
         try:
             values, slopes = problem.residuals(y, rows)
-        except Refused:  # a step into nowhere: the next one is shorter
+        except Refused:  # no motion there: the next step is shorter
             values, slopes = np.full(rows * seen, np.nan), np.zeros((rows * seen, n))
         return np.concatenate([values, y]), np.concatenate([slopes, np.eye(n)])
 
