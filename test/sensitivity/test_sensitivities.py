@@ -140,6 +140,14 @@ def test_an_object_that_stops_just_when_inputs_change_is_flagged() -> None:
     assert derivatives(later, "object.velocity_m_per_s").corner is None
 
 
+def test_the_first_state_of_an_object_that_sticks_at_once_follows_what_it_begins_with() -> None:
+    """All its derivatives at t = 0 were 0, as they are from then on."""
+    key = ["object.velocity_m_per_s"]
+    run = simulate(scenes.load("friction"), grid=np.array([0.0, 1e-3]), sensitivity=key)
+    assert run.sensitivity is not None
+    assert run.sensitivity.state_rates[:, 3, 0].tolist() == [1.0, 0.0]
+
+
 def test_times_at_which_a_force_ends_and_returns_beside_a_stuck_object() -> None:
     scene = made(0.1, 0.01, left_arm=body(1.0, 0.02, stiffness_N_per_m=50.0), object=body(),
                  right_arm=body(10.0, -0.01, stiffness_N_per_m=500.0), object_friction={"coulomb_N": 100.0},
