@@ -24,7 +24,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import EPS, LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.scene.effects.force import SECTIONS
+from grasp_ros.scene.effects.base import BODIES
 from grasp_ros.simulation.simulate import GRID_POINTS, simulate
 from grasp_ros.simulation.trajectory import Trajectory
 
@@ -51,7 +51,7 @@ def finest(scene: Scene) -> Truth:
         raise Refused(f"{scene.name}: {run.stop}; allowed here: a scene that runs to its end")
     truth, rounding = Truth(grid, run.state, _touches(run)), EPS * float(np.nanmax(np.abs(run.state[:, 0::2])))
     apart = [distance(truth, simulate(scene, grid=grid, setting=FINER * FINEST).state) / FINER]
-    for body in {*SECTIONS} & {*scene.values}:
+    for body in {*BODIES} & {*scene.values}:
         beside = scene.changed({f"{body}.position_m": scene.values[body]["position_m"] + rounding})  # farther right
         apart.append(distance(truth, simulate(beside, grid=grid, setting=FINEST).state))
     return truth._replace(uncertainty=max(apart))

@@ -7,14 +7,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from grasp_ros.physics.domain import outside
-from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.errors import allowed as what_is_allowed
+from grasp_ros.physics.errors import Refused, allowed
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects import BY_SECTION, named
-from grasp_ros.scene.effects.base import Effect
+from grasp_ros.scene.effects.base import BODIES, Effect
 
 CONTROLS = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\ud800-\udfff]")  # categories Cc, without the line break, and Cs
-SOMETHING = frozenset(("left_arm", "object", "right_arm"))
 
 
 class SceneError(Refused):
@@ -26,16 +24,16 @@ def is_text(value: Any) -> bool:
     return isinstance(value, str) and not CONTROLS.search(value)
 
 
-def check_keys(source: str, prefix: str, found: Mapping[Any, Any], allowed: Sequence[str], needed: Sequence[str]
+def check_keys(source: str, prefix: str, found: Mapping[Any, Any], known: Sequence[str], needed: Sequence[str]
                ) -> None:
     """Refuse unknown keys and missing ones."""
     for key in found:
-        if key not in allowed:
-            meant = what_is_allowed(f"{prefix}{key}", [f"{prefix}{known}" for known in allowed])
+        if key not in known:
+            meant = allowed(f"{prefix}{key}", [f"{prefix}{own}" for own in known])
             raise SceneError(f"{source}: {prefix}{key}: unknown key with the value {found[key]!r}; {meant}")
     for key in needed:
         if key not in found:
-            optional = ", ".join(key for key in allowed if key not in needed)
+            optional = ", ".join(own for own in known if own not in needed)
             every = f"the keys {', '.join(needed)}" + (f"; optional: {optional}" if optional else "")
             raise SceneError(f"{source}: {prefix}{key}: missing; allowed: {every}")
 
@@ -76,8 +74,8 @@ def _section(source: str, effect: Effect, found: Any) -> dict[str, Any]:
 
 def check_together(source: str, values: Mapping[str, Mapping[str, Any]]) -> None:
     """Refuse sections that do not go together."""
-    if not SOMETHING & values.keys():
-        raise SceneError(f"{source}: no body; allowed: at least one of {', '.join(sorted(SOMETHING))}")
+    if not BODIES.keys() & values.keys():
+        raise SceneError(f"{source}: no body; allowed: at least one of {', '.join(BODIES)}")
     effects = named(values)
     for effect in effects:
         for section in effect.needs:

@@ -21,8 +21,7 @@ from grasp_ros.physics.given import instance
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
-from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.effects.force import SECTIONS
+from grasp_ros.scene.effects.base import BODIES, SIDES
 from grasp_ros.scene.topics import CLOCK, CONTACTS, DIAGNOSTICS, EXTERNAL_FORCES, LYAPUNOV_NAMES, TIMING
 from grasp_ros.simulation import Trajectory, simulate
 from grasp_ros.simulation.tables import Tabular
@@ -102,7 +101,7 @@ class Recording(Tabular, Frozen):
         """
         inputs = np.zeros((len(self.tick), 3))
         inputs[:, [LEFT, RIGHT]] = acted_from(self.tick, self.effort)
-        external = {body: EXTERNAL_FORCES[name].name for name, body in SECTIONS.items()}
+        external = {body: EXTERNAL_FORCES[name].name for name, body in BODIES.items()}
         if any(topic in self.outputs for topic in external.values()):
             nothing = np.zeros(len(self.tick))
             inputs += np.stack([self.outputs.get(external[body], nothing) for body in (LEFT, RIGHT, OBJECT)], axis=1)

@@ -20,8 +20,7 @@ from grasp_ros.physics.energy import energy, energy_balance
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Contact, impact_force, penetration
 from grasp_ros.physics.system import COLUMN, NAMES
-from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.effects.force import SECTIONS
+from grasp_ros.scene.effects.base import BODIES, SIDES
 from grasp_ros.scene.topics import CHANGES, CLOCK, CONTACTS, EXTERNAL_FORCES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.sampled_plant import SampledPlant
@@ -231,7 +230,7 @@ def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[
             force = impact_force(Contact(*system.pairs[SIDES[side]]), u, d)
             yield (topic, "force", recording.outputs[topic][rows], force)
     external = system.external_over(np.arange(len(rows))) if system.external else np.zeros((len(rows), 3))
-    for name, body in SECTIONS.items():
+    for name, body in BODIES.items():
         if (topic := EXTERNAL_FORCES[name].name) in recording.outputs:
             yield (topic, "force", recording.outputs[topic][rows], external[:, body])
     for column, values in enumerate(_lyapunov(recording, rows, states, external)):

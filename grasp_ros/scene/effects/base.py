@@ -11,7 +11,7 @@ import numpy as np
 
 from grasp_ros.physics.domain import SMALLEST
 from grasp_ros.physics.given import plain
-from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, Place, System
 from grasp_ros.scene.topics import Topic
@@ -19,6 +19,7 @@ from grasp_ros.scene.topics import Topic
 Numbers = Mapping[str, Any]  # one section of a scene: its keys and values
 Sections = Mapping[str, Numbers]  # a whole scene
 SIDES = {"left": LEFT, "right": RIGHT}
+BODIES = {"left_arm": LEFT, "object": OBJECT, "right_arm": RIGHT}  # by section
 NANOSECONDS = 1_000_000_000
 UNITS = {  # endings of keys; the longest that fits counts
     "_kg": "kg", "_m": "m", "_s": "s", "_N": "N", "_Hz": "Hz", "_rad": "rad", "_m_per_s": "m/s", "_m_per_s2": "m/s^2",

@@ -14,14 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.physics.domain import RANGES
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import ExternalForce, System
-from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, Parameter, Sections, oddity, problem
+from grasp_ros.scene.effects.base import BODIES, NANOSECONDS, Effect, Output, Parameter, Sections, oddity, problem
 from grasp_ros.scene.effects.time import nanoseconds, period_ns
 from grasp_ros.scene.topics import EXTERNAL_FORCES
 
-SECTIONS = {"left_arm": LEFT, "object": OBJECT, "right_arm": RIGHT}
 PULSE = (
     Parameter("force_N", *RANGES["force"].bounds, "force, positive to the right"),
     Parameter("start_s", *RANGES["duration"].bounds, "begin of the pulse"),
@@ -140,5 +138,5 @@ def _effects(name: str, body: int) -> Iterable[Effect]:
         )
 
 
-EFFECTS = tuple(effect for name, body in SECTIONS.items() for effect in _effects(name, body))
+EFFECTS = tuple(effect for name, body in BODIES.items() for effect in _effects(name, body))
 FORCED = frozenset(effect.section for effect in EFFECTS)
