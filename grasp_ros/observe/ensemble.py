@@ -71,7 +71,7 @@ class Door(types.WrapperAddressProtocol):
     def __init__(self) -> None:
         compile_kernels()
         dispatcher: Any = advance
-        self._result = next(  # somebody may have called it with read-only arrays, too
+        self._result = next(  # it may have been compiled for read-only arrays, too
             result for result in dispatcher.overloads.values() if all(
                 kind.layout == "C" and kind.mutable for kind in result.signature.args if isinstance(kind, types.Array)))
 
@@ -145,7 +145,7 @@ def go_on(door: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, me
 
 @machine_door
 def run_rows(door: Any, driven: tuple[Any, ...], rows: Rows, room: Room, memory: Memory, limits: Limits) -> None:
-    """Integrate the rows, or fewer if a stop is asked for."""
+    """Integrate the rows, or fewer if `limits.stop` is set meanwhile."""
     for i in range(rows.state.shape[0]):
         if limits.stop[0] != 0:
             break

@@ -20,7 +20,7 @@ from grasp_ros.physics.given import plain
 from grasp_ros.physics.layout import BLOCK
 from grasp_ros.physics.model import Array
 
-Law = Callable[..., float]  # tick, time in s, measured x in m and v in m/s, what it asks for, see `observation`, to N
+Law = Callable[..., float]  # tick, time in s, measured x in m and v in m/s, what it observes, see `observation`, to N
 FIXED = "allowed: the scene's own number; beside a controller of the user's it is fixed for the run"
 NO_NOISE = np.zeros(2)
 WHOLE = 2.0**53  # from here on every number is a whole one
@@ -89,7 +89,7 @@ def limited(row: Any, force: float) -> Any:
 
 @lru_cache(maxsize=64)
 def normals(seed: int, side: int, block: int) -> Array:
-    """Standard normal numbers (BLOCK, 2) of one block of ticks: the same for whoever asks, in whatever order."""
+    """Standard normal numbers (BLOCK, 2) of one block of ticks: the same in whatever order they are drawn."""
     return np.random.default_rng([seed, side, block]).standard_normal((BLOCK, 2))
 
 

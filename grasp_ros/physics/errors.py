@@ -29,7 +29,7 @@ def described(error: BaseException) -> str:
     """What went wrong in somebody else's code, and where: "ValueError: words, file, line n"."""
     try:
         words = " ".join(str(error).split())
-    except Exception:  # its `__str__` is somebody else's, too
+    except Exception:  # its `__str__` is foreign code, too
         words = "without words"
     return ": ".join(filter(None, [type(error).__name__, words])) + f", {place_of(extract_tb(error.__traceback__))}"
 

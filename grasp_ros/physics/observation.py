@@ -27,7 +27,7 @@ class Observation(NamedTuple):
     state: Sequence[float]  # (6,), m and m/s
 
     def values(self, names: Sequence[str]) -> dict[str, float]:
-        """What some names ask for."""
+        """Values by the names of `OBSERVABLES`."""
         return {name: OBSERVABLES[name](self) for name in names}
 
     def other(self) -> tuple[float, float]:
@@ -56,14 +56,14 @@ def opposite(side: int) -> int:
     return RIGHT if side == LEFT else LEFT
 
 
-def asked(law: Callable[..., float]) -> tuple[str, ...]:
+def observables_of(law: Callable[..., float]) -> tuple[str, ...]:
     """Names of `OBSERVABLES` among the parameters of a law after the first four.
 
     TypeError if it cannot be called with these.
     """
     try:
         signature = inspect.signature(law)
-    except ValueError:  # some built-in callables do not tell what they take
+    except ValueError:  # some built-in callables have no signature
         return ()
     names = tuple(name for name in [*signature.parameters][OWN:] if name in OBSERVABLES)
     signature.bind(0, 0.0, 0.0, 0.0, **dict.fromkeys(names, 0.0))
@@ -71,7 +71,7 @@ def asked(law: Callable[..., float]) -> tuple[str, ...]:
 
 
 def check(names: Sequence[str], system: System, side: int, what: str) -> None:
-    """Refuse a law that asks for what the scene does not have; `what` is what the refusal begins with."""
+    """Refuse a law that observes what the scene does not have; `what` begins the refusal."""
     far = opposite(side)
     for body, name_of_it, needing in ((OBJECT, "object", _OF_OBJECT), (far, f"{NAMES[far]} arm", _OF_OTHER)):
         lacking = [name for name in names if name in needing and body in system.absent]

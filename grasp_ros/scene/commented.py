@@ -30,7 +30,6 @@ def commented(scene: Scene) -> str:
 
 
 def _comment(text: str) -> str:
-    """Lines of a comment."""
     return "".join(f"# {line}\n" for line in textwrap.wrap(" ".join(text.split()), WIDTH))
 
 
@@ -40,13 +39,13 @@ def _section(effect: Effect, scene: Scene) -> str:
     lines = [_comment(effect.text)]
     lines.append(f"{effect.section}:\n" if own else f"{effect.section}: {{}}\n")
     for parameter in effect.parameters:
-        told = f"{parameter.text}; {parameter.allowed}"
+        meaning = f"{parameter.text}; {parameter.allowed}"
         if parameter.key in own:
             line = dump({parameter.key: own[parameter.key]}).rstrip("\n")
-            lines.append(f"{textwrap.indent(line, '  ')}  # {told}\n" if "\n" not in line else
-                         f"  # {told}\n{textwrap.indent(line, '  ')}\n")
+            lines.append(f"{textwrap.indent(line, '  ')}  # {meaning}\n" if "\n" not in line else
+                         f"  # {meaning}\n{textwrap.indent(line, '  ')}\n")
         elif own:
-            lines.append(f"  # {parameter.key}: ...  # {told}\n")
+            lines.append(f"  # {parameter.key}: ...  # {meaning}\n")
     return "".join(lines)
 
 

@@ -1,7 +1,6 @@
 """Strict reading of .npz files: arrays of numbers and texts.
 
-Nothing in the file is evaluated but the headers, as literals of Python. A checksum of all arrays together says that
-nobody has changed one.
+Nothing in the file is evaluated but the headers, as literals of Python. A checksum of all arrays shows a change.
 """
 
 from __future__ import annotations

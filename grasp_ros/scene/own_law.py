@@ -11,9 +11,9 @@ from typing import Any
 
 from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused, described
-from grasp_ros.physics.observation import CALLABLE, asked
+from grasp_ros.physics.observation import CALLABLE, observables_of
 
-FAULTS = (Exception, SystemExit, GeneratorExit)  # of a user's code; a KeyboardInterrupt is somebody's Ctrl-C
+FAULTS = (Exception, SystemExit, GeneratorExit)  # of a user's code; a KeyboardInterrupt is a Ctrl-C
 
 
 def find_law(place: str, what: str) -> Law | type:
@@ -48,7 +48,7 @@ def find_law(place: str, what: str) -> Law | type:
 def begin(law: Law | type, what: str) -> Law:
     """What answers in a run that begins: a new object of a class; any other object itself, after its `reset`, if any.
 
-    What cannot be called as `physics.observation.asked` says is refused; `what` begins the refusal.
+    What cannot be called as `physics.observation.observables_of` says is refused; `what` begins the refusal.
     """
     begun: Any = law
     if isinstance(law, type):
@@ -67,7 +67,7 @@ def begin(law: Law | type, what: str) -> Law:
     if not callable(begun):
         raise Refused(f"{what}: {begun!r} is not allowed; allowed: {CALLABLE}")
     try:
-        asked(begun)
+        observables_of(begun)
     except TypeError as error:
         raise Refused(f"{what}: {error}; allowed: {CALLABLE}") from None
     return begun  # type: ignore[no-any-return]

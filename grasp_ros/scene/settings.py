@@ -1,4 +1,4 @@
-"""Settings: numbers beside those of a file or in their place; and what a scene with other numbers says of itself."""
+"""Settings: numbers beside those of a file or in their place; and the texts of a scene with other numbers."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ def apply(settings: Sequence[str], document: dict[Any, Any]) -> None:
 
 def texts_of_changed(title: str, watch: str, before: Mapping[str, Any] | None, values: Mapping[str, Any]
                      ) -> tuple[str, str]:
-    """Title, which names what is other than before if it is little, and what to watch for, which was said of that.
+    """Title, which names the changes if they are few, and what to watch for, which is left out after a change.
 
-    How long a scene lasts does not count. None: nothing was before.
+    The duration does not count as a change. `before`: the numbers without the changes; None: there are no changes.
     """
     if before is None:
         return title, watch

@@ -17,7 +17,7 @@ class Topic(NamedTuple):
     type: str
     sender: str = ""
     text: str = ""  # what its messages mean
-    latched: bool = False  # transient local: who comes later gets what was sent before
+    latched: bool = False  # transient local: a late subscriber gets what was sent before
     depth: int = DEPTH
 
 
@@ -94,7 +94,7 @@ def named(values: Iterable[float]) -> dict[str, float]:
 class Numbers:
     """Counts the announcements of a controller that are missing: they are numbered from 1 on, where it numbers them.
 
-    `late`: somebody who may have come late misses none before the first one.
+    `late`: for a subscriber that may have come late, which misses none before its first one.
     """
 
     def __init__(self, late: bool = False) -> None:

@@ -25,7 +25,7 @@ from numba.extending import is_jitted
 from grasp_ros.exact.compilation.jit import code_of_call, instruction
 from grasp_ros.physics.control import Law, command_of
 from grasp_ros.physics.errors import Failed, Refused, described
-from grasp_ros.physics.observation import Observation, asked
+from grasp_ros.physics.observation import Observation, observables_of
 
 SIGNATURE = float64(int64, float64, float64, float64)
 COLOUR, BESIDE = re.compile(r"\x1b\[[0-9;]*m"), ("Failed in", "During")  # of numba's errors
@@ -87,7 +87,7 @@ class UserController:
     """
 
     def __init__(self, side: str, law: Law) -> None:
-        self.asks = asked(law)
+        self.asks = observables_of(law)
         self.observe: Callable[[int], Observation]
         numba_law = is_jitted(law) or isinstance(law, CFunc)
         named = getattr(law, "__wrapped__", law) if numba_law else law

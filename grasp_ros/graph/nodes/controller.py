@@ -18,7 +18,7 @@ from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.serialization import list_message, template_of
 from grasp_ros.physics.control import FIXED, command_of, limited
 from grasp_ros.physics.errors import Refused, described
-from grasp_ros.physics.observation import Observation, asked, check
+from grasp_ros.physics.observation import Observation, check, observables_of
 from grasp_ros.physics.system import COLUMN, NAMES, System
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.own_law import begin, find_law
@@ -241,7 +241,7 @@ class OwnLaw:
     def reset(self) -> None:
         """Begin anew, without memory."""
         self._law = begin(self._found, f"law: {self.words}")
-        self.asks = asked(self._law)
+        self.asks = observables_of(self._law)
 
     def command(self, system: System, side: int, tick: int, time: float, state: Sequence[float]) -> float:
         """Command in N that answers the state (6,) of a tick, through the stages of the scene."""

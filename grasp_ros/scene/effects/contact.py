@@ -53,7 +53,7 @@ def _odd(side: str, sections: Sections, system: System) -> Iterable[str]:
 
 
 def _pressing(system: System, side: int, depth: float) -> float:
-    """Energy in J with which an arm and the object can be pressed into each other: of motion, and of today's forces."""
+    """Energy in J that can press an arm and the object into each other: of motion, and of the forces at t = 0."""
     loop, external, energy = system.closed_loop, system.external_at(0), 0.0
     inward = 1.0 if side == LEFT else -1.0  # for the arm
     for body, sign in ((side, inward), (OBJECT, -inward)):
