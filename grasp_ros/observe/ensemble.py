@@ -1,6 +1,6 @@
 """Many runs in one call: rows of plants, each integrated to its end as `Integrator` does it, without the interpreter.
 
-The door `driver.advance` is called by its address, because a second copy of its machine code would take as long to
+`driver.advance` is called by its address, because a second copy of its machine code would take as long to
 compile as the first. What is out of the ordinary is left to `Integrator`: a row that ends otherwise than at the end of
 its horizon is only marked.
 """
@@ -15,8 +15,7 @@ import numpy as np
 from numba.core import types
 
 from grasp_ros.exact.compensated import write_penetrations
-from grasp_ros.exact.compilation.jit import address_of_code, kernel
-from grasp_ros.exact.compilation.jit import door as machine_door
+from grasp_ros.exact.compilation.jit import address_of_code, door, kernel
 from grasp_ros.exact.driver.advance import advance
 from grasp_ros.exact.driver.callback import ADDRESS, FINISH, tell
 from grasp_ros.exact.driver.workspace import workspace
@@ -65,7 +64,7 @@ class Limits(NamedTuple):
 
 
 @cache
-class Door(types.WrapperAddressProtocol):
+class Advance(types.WrapperAddressProtocol):
     """`advance`, compiled where it has not been, for a call by its address."""
 
     def __init__(self) -> None:
@@ -76,11 +75,11 @@ class Door(types.WrapperAddressProtocol):
                 kind.layout == "C" and kind.mutable for kind in result.signature.args if isinstance(kind, types.Array)))
 
     def __wrapper_address__(self) -> int:
-        """Its address."""
+        """Address of its machine code."""
         return address_of_code(self._result)
 
     def signature(self) -> Any:
-        """Its types."""
+        """Types of its arguments and of its result."""
         return self._result.signature
 
 
@@ -107,13 +106,13 @@ def load_row(rows: Rows, i: int, room: Room, memory: Memory) -> None:
 
 
 @kernel
-def run_row(door: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, limits: Limits) -> int:
+def run_row(move: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, limits: Limits) -> int:
     """Integrate a row over the interval of the loop, and count its touches; why it ended."""
     place = Loop(*driven).place
     place[Place.INTERVAL] = place[Place.BEGUN] = 0
     outcome, events, out = np.int64(Outcome.EVENTS_FULL.value), 0, room.out
     while outcome == Outcome.EVENTS_FULL and events <= limits.max_events:
-        outcome = door(
+        outcome = move(
             room.block, room.order, room.plant_block, room.state_block, room.state.mode, limits.tolerance,
             limits.max_work, out.grid, out.rows, out.events, out.filled, out.work, out.observer, driven)
         for k in range(out.filled[Filled.EVENTS]):
@@ -125,14 +124,14 @@ def run_row(door: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, 
 
 
 @kernel
-def go_on(door: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, memory: Memory, limits: Limits) -> int:
+def go_on(move: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, memory: Memory, limits: Limits) -> int:
     """Go on with a row as `observer.settle` does, until V_c decides; why it ended."""
     seen, outcome, done, loop = memory.seen, Outcome.DONE.value, 1, Loop(*driven)
     wanted, memory.switches[Switch.WANTED] = memory.switches[Switch.WANTED], Wanted.SETTLING.value
     left, right = rows.touches[i, 0], rows.touches[i, 1]
     while seen[Seen.SETTLED] == UNDECIDED and done < limits.horizons and outcome == Outcome.DONE:
         loop.begins[0] = done * loop.lengths[0]
-        outcome = run_row(door, driven, rows, i, room, limits)
+        outcome = run_row(move, driven, rows, i, room, limits)
         tell(room.out.observer, FINISH, 0.0)
         done += 1
     loop.begins[0] = 0.0
@@ -143,21 +142,21 @@ def go_on(door: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, me
     return int(outcome)
 
 
-@machine_door
-def run_rows(door: Any, driven: tuple[Any, ...], rows: Rows, room: Room, memory: Memory, limits: Limits) -> None:
+@door
+def run_rows(move: Any, driven: tuple[Any, ...], rows: Rows, room: Room, memory: Memory, limits: Limits) -> None:
     """Integrate the rows, or fewer if `limits.stop` is set meanwhile."""
     for i in range(rows.state.shape[0]):
         if limits.stop[0] != 0:
             break
         load_row(rows, i, room, memory)
         tell(room.out.observer, BEGIN, limits.settled)
-        outcome = run_row(door, driven, rows, i, room, limits)
+        outcome = run_row(move, driven, rows, i, room, limits)
         for place in range(6):
             rows.state[i, place] = room.state.y[place]
         if room.out.observer[ADDRESS] != 0:
             tell(room.out.observer, FINISH, 0.0)
             if outcome == Outcome.DONE and memory.switches[Switch.WANTED] & Wanted.SETTLING.value:
-                outcome = go_on(door, driven, rows, i, room, memory, limits)
+                outcome = go_on(move, driven, rows, i, room, memory, limits)
             for place in range(memory.seen.shape[0]):
                 rows.seen[i, place] = memory.seen[place]
         rows.outcome[i] = outcome
@@ -186,4 +185,4 @@ def integrate_rows(rows: Rows, duration: float, wanted: Wanted, limits: Limits) 
         room = Room(block, order, *run, Output(
             np.zeros(0), np.zeros((0, 6)), events, np.zeros(len(Filled), dtype=np.int64),
             np.zeros(len(Work), dtype=np.int64), observer))
-        run_rows(Door(), driven, rows, room, run_observer.memory, limits)
+        run_rows(Advance(), driven, rows, room, run_observer.memory, limits)
