@@ -25,7 +25,7 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--error", type=float, metavar="E", help="largest error that you accept, in all states (m, m/s)")
     sub.add_argument("--budget", type=float, metavar="S", help="longest time in s that a simulation may take")
     sub.add_argument("--seconds", type=float, default=SECONDS, metavar="S",
-                     help=f"after which no measurement begins (default {SECONDS:g})")
+                     help=f"time in s after which no measurement begins (default {SECONDS:g})")
     add_file(sub, "FIGURE", "draw error against time, .png, .svg or .pdf; - is the standard output")
     add_json(sub)
 

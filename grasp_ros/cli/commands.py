@@ -20,17 +20,17 @@ COMMANDS: dict[str, Entry] = {
     "simulate": Entry("simulate", _RUNS, "simulate a scene"),
     "plot": Entry("plot", _RUNS, "draw or animate bags, files of `grasp simulate`, or scenes"),
     "map": Entry("map", _RUNS, "simulate many variants of a scene: a grid over two numbers, or a sample"),
-    "design": Entry("design", _RUNS, "choose numbers of a scene that make an outcome small"),
-    "fit": Entry("fit", _RUNS, "estimate numbers of a scene from a bag or a table, with intervals"),
+    "design": Entry("design", _RUNS, "choose parameters of a scene that minimise an outcome"),
+    "fit": Entry("fit", _RUNS, "estimate parameters of a scene from a bag or a table, with confidence intervals"),
     "accuracy": Entry("accuracy", _RUNS, "error against time of every method on a scene, and the setting to take"),
-    "methods": Entry("simulate", _RUNS, "list the methods of integration"),
+    "methods": Entry("simulate", _RUNS, "list the integration methods"),
     "run": Entry("graph", _GRAPH, "run a scene in four ROS 2 processes and record a bag"),
     "watch": Entry("graph", _GRAPH, "watch a running graph, or a bag, in the terminal"),
     "ctl": Entry("graph", _GRAPH, "pause, step or reset a graph, set its parameters; or a shell for it"),
     "inspect": Entry("bags", _GRAPH, "print what is in a bag, or write it as a table"),
-    "verify": Entry("bags", _GRAPH, "simulate a bag again with its recorded inputs, compare every bit"),
+    "verify": Entry("bags", _GRAPH, "simulate a bag again with its recorded inputs and compare every bit"),
     "replay": Entry("graph", _GRAPH, "publish a bag again, with its clock"),
-    "recover": Entry("bags", _GRAPH, "make a new bag of one that was cut off or damaged"),
+    "recover": Entry("bags", _GRAPH, "write a new bag from one that was cut off or damaged"),
 }
 
 

@@ -25,14 +25,14 @@ def add_to(commands: Any) -> None:
     sub = add_command(commands, "design", _design)
     add_scene(sub)
     sub.add_argument("--free", action="append", required=True, metavar=RANGE,
-                     help="number to choose within a range; + between keys that share one value; repeatable")
+                     help="parameter to choose within a range; + between keys that share one value; repeatable")
     sub.add_argument("--minimise", action="append", required=True, metavar="OUTCOME",
                      help=f"outcome to minimise: the largest column of one of {', '.join(GROUPS)}, or one column;"
                      " given twice: the Pareto front of both")
     sub.add_argument("--subject-to", action="append", default=[], metavar="OUTCOME<=NUMBER", dest="bounds",
                      help="largest value of an outcome, or of every column of a group")
     sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
-    sub.add_argument("--seed", type=whole(0), default=0, metavar="S", help="of the search (default 0)")
+    sub.add_argument("--seed", type=whole(0), default=0, metavar="S", help="seed of the search (default 0)")
     sub.add_argument("--figure", type=named, metavar="FIGURE",
                      help="draw the outcome along each number, or two outcomes")
     add_accuracy(sub)

@@ -22,14 +22,14 @@ def add_to(commands: Any) -> None:
     sub.add_argument("source", metavar="BAG|FILE.npz|FILE.csv", type=named, help="a bag, a file of `grasp simulate -o`,"
                      f" or a table with columns t_s and some of {', '.join(CHANNELS)}")
     sub.add_argument("--free", action="extend", nargs="+", required=True, metavar="KEY",
-                     help="numbers to estimate, section.key, or the offset of a sensor, offset.CHANNEL")
-    complete_scenes(sub.add_argument("--scene", help="what is known, and where the search starts (default: the scene of"
+                     help="parameters to estimate, section.key, or the offset of a sensor, offset.CHANNEL")
+    complete_scenes(sub.add_argument("--scene", help="model and start of the search (default: the scene of"
                                      " the data; a table has none)"))
     add_settings(sub)
     sub.add_argument("--against", action="append", default=[], metavar="KEY=VALUE",
                      help="test whether the data reject this value of a number that is free; repeatable")
     sub.add_argument("--by-sensors", action="store_true",
-                     help="of a bag: what the sensors of its scene have measured, in place of the exact states")
+                     help="of a bag: use the measurements of the sensors instead of the exact states")
     add_file(sub, "FILE", "the scene with the estimates, .yaml, or measured against fitted, .png, .svg or .pdf; - is"
                " the standard output")
     add_json(sub)

@@ -48,7 +48,7 @@ def add_to(commands: Any) -> None:
         "--free-running", type=float, nargs="?", const=1.0, metavar="FACTOR",
         help="follow the wall clock, FACTOR simulated seconds per second (default 1), instead of lockstep",
     )
-    _add_namespace(sub, "of all names, /clock too; for several graphs")
+    _add_namespace(sub, "namespace of all names, also /clock; for several graphs")
     sub.add_argument("--one-process", action="store_true", help="run all nodes in one process and one thread")
     sub.add_argument("--paused", action="store_true", help="begin paused at the first state, see ctl")
     sub.add_argument(
@@ -68,16 +68,16 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="playback: bag time / wall time (default 1)")
     _add_network(sub)
     sub = add_command(commands, "watch", _watch)
-    sub.add_argument("bag", type=named, nargs="?", help="a bag; default: the graph that runs")
+    sub.add_argument("bag", type=named, nargs="?", help="a bag (default: the running graph)")
     sub.add_argument("--rate", type=float, metavar="R", help="playback: bag time / wall time (default 1)")
     sub.add_argument("--from", dest="first", type=float, metavar="S", help="time in the bag to begin at, in s")
-    _add_namespace(sub, "of the graph")
+    _add_namespace(sub, "namespace of the graph")
     _add_network(sub)
     sub = add_command(commands, "ctl", _ctl)
     sub.add_argument("words", nargs="*", metavar="WORD", help="pause, resume, step [N], reset, status, get NODE"
                      " [NAME ...], set NODE NAME VALUE, echo TOPIC [N], without N until a Ctrl-C; none: a shell that"
-                     " stays connected, whose exit status is that of its worst line")
-    _add_namespace(sub, "of the graph")
+                     " stays connected, whose exit status is the worst of its lines")
+    _add_namespace(sub, "namespace of the graph")
     _add_network(sub)
 
 

@@ -32,13 +32,13 @@ def add_to(commands: Any) -> None:
     add_scene(sub)
     add_accuracy(sub)
     add_json(sub)
-    sub.add_argument("--x", metavar=RANGE, help="number of the x axis, section.key: n values (default 101), linear or"
-                     " logarithmic; + between keys with one value")
+    sub.add_argument("--x", metavar=RANGE, help="parameter of the x axis, section.key: n values (default 101), linear"
+                     " or logarithmic; + between keys with one value")
     sub.add_argument("--y", metavar=RANGE, help="the same for y")
     sub.add_argument("--vary", action="append", default=[], metavar="KEY[+KEY]=low:high[::log]",
-                     help="one more number of a sample; + between keys with one value")
+                     help="one more parameter of a sample; + between keys with one value")
     sub.add_argument("--sample", type=whole(1), default=0, metavar="N", help="N rows at random, a Sobol sequence")
-    sub.add_argument("--seed", type=whole(0), default=0, metavar="S", help="of the sample (default 0)")
+    sub.add_argument("--seed", type=whole(0), default=0, metavar="S", help="seed of the sample (default 0)")
     sub.add_argument("--outcome", action="append", default=[], metavar="NAME",
                      help=f"one of {', '.join(GROUPS)}, or a column of one (default settling_time and touches)")
     sub.add_argument("--settled", type=float, default=SETTLED, metavar="PART", help="a run is settled within this"

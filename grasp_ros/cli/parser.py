@@ -69,5 +69,5 @@ def _number(word: str) -> float:
 def add_levels(parser: argparse.ArgumentParser, default: object = argparse.SUPPRESS) -> None:
     """How much is said beside the results."""
     level = parser.add_mutually_exclusive_group()
-    level.add_argument("-q", "--quiet", action="store_true", default=default, help="say nothing but results and errors")
-    level.add_argument("-v", "--verbose", action="store_true", default=default, help="also say versions and how long")
+    level.add_argument("-q", "--quiet", action="store_true", default=default, help="print only results and errors")
+    level.add_argument("-v", "--verbose", action="store_true", default=default, help="also print versions and times")

@@ -32,17 +32,17 @@ WIDE = 100.0  # a derivative that grows by more has a logarithmic axis
 def add_to(commands: Any) -> None:
     """Add the subcommand."""
     sub = add_command(commands, "plot", _plot)
-    sub.add_argument("sources", metavar="BAG|FILE.npz|SCENE", nargs="+", help="what to draw together")
+    sub.add_argument("sources", metavar="BAG|FILE.npz|SCENE", nargs="+", help="sources to draw together")
     add_settings(sub)
     sub.add_argument("--sampled", action="store_true", help="scenes: hold each command over a control period")
-    sub.add_argument("--method", choices=METHODS, default=EXACT, help="scenes: way to integrate; see `grasp methods`")
+    sub.add_argument("--method", choices=METHODS, default=EXACT, help="scenes: integration method; see `grasp methods`")
     sub.add_argument("--step", type=float, metavar="S", help="scenes: step or tolerance of the method")
     sub.add_argument("--sensitivity", action="append", default=[], metavar="KEY",
                      help="one scene: also draw derivatives of positions with respect to section.key; repeatable")
     sub.add_argument("--panel", dest="panels", action="append", choices=plots.PANELS, metavar="P",
-                     help=f"what is drawn, in this order; repeatable: {', '.join(plots.PANELS)} (default: all)")
-    sub.add_argument("--from", dest="first", type=float, metavar="S", help="first time shown, in s")
-    sub.add_argument("--to", dest="last", type=float, metavar="S", help="last time shown, in s")
+                     help=f"panels to draw, in this order; repeatable: {', '.join(plots.PANELS)} (default: all)")
+    sub.add_argument("--from", dest="first", type=float, metavar="S", help="begin of the time range, in s")
+    sub.add_argument("--to", dest="last", type=float, metavar="S", help="end of the time range, in s")
     sub.add_argument("--width", type=float, metavar="MM", help="width of the page (default 230 mm, 90 is a column)")
     add_file(sub, "FILE", "image, say .png, .svg or .pdf; - is the standard output (default: .png beside the source)")
     sub.add_argument("--animate", action="store_true",

@@ -24,7 +24,7 @@ def add_to(commands: Any) -> None:
     add_json(sub)
     sub = add_command(commands, "new", _new)
     complete_scenes(sub.add_argument("--like", metavar="SCENE", default=DEFAULT,
-                                     help=f"what it begins with (default {DEFAULT})"))
+                                     help=f"scene to copy (default {DEFAULT})"))
     add_settings(sub)
     sub.add_argument("file", metavar="FILE.yaml", type=Path,
                      help="new file, whose name is that of the scene; - is the standard output")

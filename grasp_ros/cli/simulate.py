@@ -40,7 +40,7 @@ def add_to(commands: Any) -> None:
     method = sub.add_argument_group("method")
     add_accuracy(method)
     method.add_argument("--method", choices=METHODS, metavar="M", default=EXACT,
-                        help=f"way to integrate, see `grasp methods` (default {EXACT})")
+                        help=f"integration method, see `grasp methods` (default {EXACT})")
     setting = method.add_mutually_exclusive_group()
     setting.add_argument("--step", type=float, metavar="S", help="step in s of a method with a fixed step")
     setting.add_argument("--tolerance", type=float, metavar="T", help="tolerance (rtol = atol) of an adaptive method")
