@@ -226,14 +226,14 @@ def _why_none(problem: DesignProblem, nearest: Found) -> str:
     """What keeps the choice that breaks the bounds least from being one."""
     if nearest.stops:
         return f"; {nearest.stops[0]}"
-    if all(np.isfinite(values[0]) for values in nearest.outcomes.values()):
+    if 0.0 < nearest.excess[0] < np.inf:
         return "; the nearest has " + ", ".join(f"{name} {value[0]:.6g}" for name, value in nearest.outcomes.items())
     if wanted_by(find(problem.names)) & Wanted.SETTLING:
         return f"; {problem.scene.why_unsettled(problem.setup.sampled)}; last_outside needs no proof"
     return ""
 
 
-def front(problem: DesignProblem, seed: int = 0, progress: Told | None = None) -> list[Design]:
+def front(problem: DesignProblem, seed: int = 0, progress: Callback | None = None) -> list[Design]:
     """The Pareto front of the two outcomes of a problem, from the first outcome's best on.
 
     Each has the smallest first outcome for a bound on the second one; the bounds are even between the two ends. One

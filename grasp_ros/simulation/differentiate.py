@@ -94,6 +94,7 @@ def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
     states = complete(scene, integrator, sampled, times)
     carrier.finish()
     m = len(grid)
+    carrier.out[:m][grid == 0.0] = changes.state  # before friction holds an object that has just been put there
     at_events = event_rates(scene, changes, sampled, events, Moments(states[m:], carrier.out[m:], carrier.forces))
     states[:, system.absent_columns] = carrier.out[:, system.absent_columns] = np.nan
     check_same(run, grid, states[:m], integrator.event_table)
