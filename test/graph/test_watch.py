@@ -24,14 +24,16 @@ from processes import DEADLINE, GRASP, START, node_command, ran, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rich.console import Console
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
 from grasp_ros.graph.processes import Graph
+from grasp_ros.graph.ros.messages import qos
 from grasp_ros.graph.terminal import HINT, View, moment_of
 from grasp_ros.physics.accuracy import ACCURACY
-from grasp_ros.scene.topics import JOINT_STATES
+from grasp_ros.scene.topics import JOINT_STATES, SCENE
 from grasp_ros.simulation import simulate
 from lab.drills import recorder
 
@@ -171,6 +173,26 @@ def test_a_plant_of_others_may_answer_whatever_it_likes(
     peer.create_publisher(JointState, JOINT_STATES.name, 1)
     screen = Screen(launch, *START, "watch")
     wait_for(lambda: executor.spin_once(timeout_sec=0.05) or screen.shows("the plant is [/x] at tick 3"), "its words")
+    screen.press(b"q")
+    assert screen.end() == 0
+
+
+def test_states_without_the_bodies_of_the_scene_are_passed_over(
+    launch: Any, node: tuple[Any, SingleThreadedExecutor]
+) -> None:
+    """They were drawn, with bodies at nan."""
+    peer, executor = node
+    latched = peer.create_publisher(String, SCENE.name, qos(SCENE))
+    latched.publish(String(data=scenes.load("arm_alone").to_yaml()))
+    states, screen = peer.create_publisher(JointState, JOINT_STATES.name, 1), Screen(launch, *START, "watch")
+
+    def shown(name: str, words: str) -> bool:
+        states.publish(JointState(name=[name], position=[0.25], velocity=[0.0], effort=[0.0]))
+        executor.spin_once(timeout_sec=0.05)
+        return screen.shows(words)
+
+    wait_for(lambda: shown("left", "+0.25000"), "the arm")
+    assert not any(shown("elbow", "nan") for _ in range(30))
     screen.press(b"q")
     assert screen.end() == 0
 

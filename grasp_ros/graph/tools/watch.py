@@ -30,6 +30,7 @@ from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.graph.serialization import MOST_BYTES, SHORTEST, raw_force, raw_stamp_ns
 from grasp_ros.graph.terminal import FRAME_SECONDS, Key, Keys, Moment, View
 from grasp_ros.physics.errors import printable
+from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.topics import COMMANDS, CONTACTS, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW, Topic, named
 
@@ -46,7 +47,7 @@ class Watch(GraspNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("watch", **options)
         self._view: View | None = None
-        self._reader, self._lockstep = messages.StateReader(()), True
+        self._lockstep = True
         self._seen: defaultdict[Topic, dict[int, bytes]] = defaultdict(dict)  # the last messages, by their stamps
         self._found: dict[Topic, bytes] = {}  # those of the newest state of which all have come
         self._state, self._stale = -1, 0.0  # stamp of the last one, and until when nothing but states is taken
@@ -74,6 +75,7 @@ class Watch(GraspNode):
 
     def _on_scene(self, message: Any) -> None:
         self._view = View(scenes.parse(message.data, SCENE.name, f"topic {SCENE.name}"))
+        self._reader = messages.StateReader([NAMES[body] for body in self._view.scene.system.present])
         self._seen.clear()
         self._found, self._state, self._stale = {}, -1, 0.0
 
