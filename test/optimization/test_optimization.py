@@ -97,8 +97,6 @@ def test_a_bound_that_no_choice_keeps_costs_the_front_one_choice(monkeypatch: py
     ({BOTH_KV: (1.0, 2.0)}, "settling_time", {"beauty": 1.0}, "outcome beauty: not known"),
     ({BOTH_KV: (1.0, 2.0)}, "settling_time", {"peak_input": 1e-3},
      r"none of .* with peak_input <= 0.001; the nearest has settling_time [\d.]+, peak_input 2\.5$"),
-    ({BOTH_KV: (1.0, 2.0)}, "last_outside", {"peak_input": 1e-3},
-     r"none of .* finite last_outside with peak_input <= 0.001; the nearest has last_outside inf, peak_input 2\.5$"),
     ({"right_contact.dissipation_s_per_m": (0.1, 0.2)}, "peak_input_left", {}, r"nothing to choose: .* 1\.5 for all"),
     ({}, "settling_time", {}, "axes: none"),
     ({BOTH_KV: (2.0, 1.0)}, "settling_time", {}, "2.0 to 1.0 is not .* allowed: low < high"),
@@ -112,6 +110,13 @@ def test_a_bound_that_no_choice_keeps_costs_the_front_one_choice(monkeypatch: py
 def test_what_cannot_be_designed_is_refused(free: Any, minimise: str, bounds: Any, words: str) -> None:
     with pytest.raises(gr.Refused, match=words):
         gr.design(gr.load("case_01"), free, minimise, bounds)
+
+
+def test_a_bound_that_no_choice_keeps_is_named_where_the_outcome_is_missing_as_well() -> None:
+    """The sentence told of the outcome alone: nothing had settled within 2 s."""
+    scene = gr.load("case_01", ["time.duration_s=2"])
+    with pytest.raises(gr.Refused, match=r"<= 0.001; the nearest has last_outside inf, peak_input 2\.5$"):
+        gr.design(scene, {BOTH_KV: (1.0, 2.0)}, "last_outside", {"peak_input": 1e-3})
 
 
 def test_a_settling_time_that_nothing_proves_is_refused_with_the_reason() -> None:

@@ -171,10 +171,9 @@ class Monitor(PeerNode):
         self.counters["lost announcements"] = self._lyapunov.lost
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
-        sources = self._sources.get(topic)  # of commands: is this one nobody else's?
-        sure = sources is None or (sources.settled() and sources.number < 2
-                                   and (command := raw_command(cdr)) is not None
-                                   and self._limits.allow(topic, command[1]))
+        known = self._sources.get(topic)  # of commands: is this one nobody else's?
+        sure = known is None or (known.settled() and known.number < 2 and (command := raw_command(cdr)) is not None
+                                 and self._limits.allow(topic, command[1]))
         arrival = self._synchronizer.put(topic, cdr, sure)
         if arrival is Arrival.TAKEN:
             self._drain()
