@@ -15,7 +15,7 @@ def test_page_quick_has_all_sections_and_figures(lab_command: Any, tmp_path: Pat
     assert result.returncode == 0, result.stderr
     text = (tmp_path / "docs" / "accuracy.md").read_text()
     for title in ("Which method", "What the paper's method costs", "Energy in the elastic case", "over topics",
-                  "Where the time goes", "How many times as long others take"):
+                  "Where the time goes", "Run times of other methods"):
         assert title in text
     shown = [part.split(")")[0] for part in text.split("](accuracy/")[1:]]
     assert len(shown) == 7

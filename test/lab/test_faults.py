@@ -26,7 +26,7 @@ def test_quick_drills_pass_and_are_written(lab_command: Any, tmp_path: Path) -> 
     assert len(drills) >= 3
     for drill in drills:
         [row] = [line for line in text.splitlines() if line.startswith(f"| {drill.fault} |")]
-        assert row.endswith(("| survived |", "| ended with a sentence |"))
+        assert row.endswith(("| survived |", "| ended with a message |"))
     assert str(tmp_path) not in text
     assert "/tmp" not in text
 

@@ -19,11 +19,11 @@ class Verdict(Enum):
     HUNG = "hung"
     LOST = "lost data"
     WRONG = "wrong result"
-    SILENT = "no sentence"
-    NAME = "blames another"
+    SILENT = "no message"
+    NAME = "names another process"
     LATE = "noticed late"
     SURVIVED = "survived"
-    SENTENCE = "ended with a sentence"
+    SENTENCE = "ended with a message"
 
     @property
     def passes(self) -> bool:
