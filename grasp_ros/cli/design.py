@@ -53,7 +53,7 @@ def _design(options: argparse.Namespace) -> int:
     check_output(options.figure, figure_endings(options.figure), options.force, [options.scene])
     several = len(options.minimise) == 2
     if several and options.output is not None:
-        raise Refused("-o: allowed: with one --minimise, which has one best choice; the table has the numbers of all")
+        raise Refused("-o: allowed: with one --minimise, which has one best choice; the table lists all choices of two")
     prepare()
     with bar(None, "run", scene.name) as progress:
         found: Sequence[Design] = (

@@ -43,7 +43,7 @@ class Running:
             if reaction not in REACTIONS:
                 raise Refused(f"{side}_on_timeout: {reaction!r} is not allowed; allowed: {', '.join(REACTIONS)}")
         if self.timeouts.keys() != self.reactions.keys():
-            raise Refused("timeouts, reactions: not of the same sides")
+            raise Refused("timeouts, reactions: different sides; allowed: the same sides in both")
 
     @property
     def lockstep(self) -> bool:
@@ -74,4 +74,4 @@ def parse(text: str) -> Running:
         found.pop("mode")
         return Running(**found)
     except (Refused, AttributeError, KeyError, TypeError) as error:
-        raise Refused(f"run: not what a plant says: {' '.join(str(error).split())}") from None
+        raise Refused(f"run: not a description of a run by a plant: {' '.join(str(error).split())}") from None

@@ -61,11 +61,11 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
     if any(acts(number.key) for number in numbers):
         found = found._replace(inputs=None)
     if found.inputs is None and found.why_unknown:
-        raise Refused(f"{found.name}: {found.why_unknown}; allowed: inputs at every tick, and no free number of"
+        raise Refused(f"{found.name}: {found.why_unknown}; allowed: inputs at every tick, and no free parameter of"
                       " controllers or external forces")
     for key, value in against.items():
         if key not in free or key.startswith(OFFSET):
-            raise Refused(f"against: {key}: allowed: a number of the scene that is free")
+            raise Refused(f"against: {key}: allowed: a free parameter of the scene")
         check_keys(found.scene.changed({key: value}), [key], found.sampled)
     samples = len(found.t) * len(found.channels)
     if samples < len(numbers) + FEWEST:

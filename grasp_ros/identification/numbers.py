@@ -67,7 +67,7 @@ def numbers_of(scene: Scene, keys: Sequence[str], data: Measured) -> tuple[Numbe
         raise Refused(f"free: {twice[0]}: given twice")
     found = tuple(_offset(key, data) if key.startswith(OFFSET) else _number(scene, key) for key in keys)
     if all(number.channel is not None for number in found):
-        raise Refused(f"free: {', '.join(keys) or 'nothing'}; allowed: at least one number of the scene, such as"
+        raise Refused(f"free: {', '.join(keys) or 'nothing'}; allowed: at least one parameter of the scene, such as"
                       " left_contact.hertz_N_per_m1_5")
     return found
 

@@ -126,8 +126,8 @@ def check(
         raise Refused(f"{name}: has no budget of work; allowed with one: {_able('work_budget')}")
     if not method.effects and (odd := _beside_the_paper(scene)):
         raise Refused(
-            f"{name}: {scene.name} {'; '.join(odd)}; it knows the paper's grasp alone: two arms with feedback to 0, an"
-            f" object and both contacts; allowed here: {_able('effects')}"
+            f"{name}: {scene.name} {'; '.join(odd)}; it supports only the paper's grasp: two arms with feedback to 0,"
+            f" an object and both contacts; allowed here: {_able('effects')}"
         )
     if method.package is not None:
         need(name, method.package)

@@ -215,8 +215,8 @@ def search(problem: DesignProblem, seed: int = 0, progress: Callback | None = No
         raise Refused(f"{problem.scene.name}: none of {runs} choices has a finite {problem.minimise[0]}"
                       + (f" with {wish}" if wish else "") + _why_none(problem, tried))
     if worst - least <= AGREE * abs(least):
-        raise Refused(f"{problem.scene.name}: nothing to choose: {problem.minimise[0]} is {least:.10g} for all of"
-                      f" {runs} choices; allowed: numbers and ranges that change it")
+        raise Refused(f"{problem.scene.name}: nothing to choose: {problem.minimise[0]} is {least:.10g} for all"
+                      f" {runs} choices; allowed: parameters and ranges that change it")
     outcomes = {name: float(values[0]) for name, values in tried.outcomes.items()}
     numbers = {key: float(values[0]) for key, values in best.items()}
     return Design(problem.scene.changed(numbers), numbers, outcomes, runs)

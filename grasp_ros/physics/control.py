@@ -75,7 +75,7 @@ def command_of(answer: object, who: str, tick: int, time: float) -> float:
     except OverflowError:
         force = answer = math.inf if answer > 0 else -math.inf  # type: ignore[operator]  # too long to be printed
     if not math.isfinite(force):
-        raise Refused(f"{who}: it answered {answer!r} at tick {tick}, t = {time!r} s; allowed: a finite number of N")
+        raise Refused(f"{who}: it returned {answer!r} at tick {tick}, t = {time!r} s; allowed: a finite number of N")
     return force
 
 

@@ -54,8 +54,8 @@ def read_npz(path: Path) -> dict[str, np.ndarray]:
             except DAMAGE as error:
                 raise Refused(f"{name}: {error}") from None
             if not isinstance(found[name], np.ndarray):  # of a member that does not begin as numpy's do
-                raise Refused(f"{name}: no array of numpy")
+                raise Refused(f"{name}: not a NumPy array")
     said = str(found.pop(DIGEST, ""))
     if said != _digest(found):
-        raise Refused(f"{DIGEST}: {said[:64]!r}; allowed: the checksum of these arrays, which nobody has changed")
+        raise Refused(f"{DIGEST}: {said[:64]!r}; allowed: the checksum of these arrays; the file has changed")
     return found

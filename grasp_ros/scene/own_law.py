@@ -63,7 +63,7 @@ def begin(law: Law | type, what: str) -> Law:
         elif hasattr(law, "reset"):
             law.reset()
     except FAULTS as error:
-        raise Refused(f"{what}: {law!r} does not begin: {described(error)}") from error
+        raise Refused(f"{what}: {law!r} cannot be initialised: {described(error)}") from error
     if not callable(begun):
         raise Refused(f"{what}: {begun!r} is not allowed; allowed: {CALLABLE}")
     try:

@@ -1,4 +1,4 @@
-"""YAML without its surprises: 1e4 is a number, 017, 1_000 and 1:30 are not, and no key stands twice."""
+"""YAML without its surprises: 1e4 is a number, 017, 1_000 and 1:30 are not, and no key occurs twice."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def _mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
         if not isinstance(key, Hashable):
             raise Refused(f"{key!r} is a key; allowed: texts as keys")
         if key in result:
-            raise Refused(f"line {key_node.start_mark.line + 1}: {key}: the key stands twice; allowed: once")
+            raise Refused(f"line {key_node.start_mark.line + 1}: {key}: the key occurs twice; allowed: once")
         result[key] = loader.construct_object(value_node, deep=True)
     return result
 

@@ -94,13 +94,13 @@ def check_keys(scene: Scene, keys: Sequence[str], sampled: bool) -> list[Paramet
     Raises
     ------
     Refused
-        If the scene does not name a number, or it does not enter smoothly, or a sensor measures in steps.
+        If a key is not in the scene, the motion does not depend smoothly on it, or a sensor quantises.
     """
     if not keys:
-        raise Refused(f"{scene.name}: sensitivity: nothing; allowed: numbers of the scene, such as object.position_m")
+        raise Refused(f"{scene.name}: sensitivity: nothing; allowed: keys of the scene, such as object.position_m")
     for side, law in scene.system.laws.items():
         if (sampled or scene.sampled) and law.row[[*STEPS]].any():
-            raise Refused(f"{scene.name}: the {('left', 'right')[side]} arm is measured in steps, which have no"
+            raise Refused(f"{scene.name}: the {('left', 'right')[side]} sensor quantises, which has no"
                           " derivative; allowed: a sensor without position_step_m and velocity_step_m_per_s")
     found = [check_key(scene, key) for key in keys]
     for key in keys:

@@ -53,8 +53,8 @@ def spectrum(scene: Scene, *, accuracy: float = ACCURACY) -> Array:
             lost = np.full(len(places) - known, -np.inf)
             return np.concatenate([np.where(close, before[:known] / scene.duration, np.nan), lost])
         pieces, before = 2 * pieces, grown
-    raise Refused(f"{scene.name}: Lyapunov exponents: tangents lose their digits within"
-                  f" {scene.duration / MOST_PIECES:.3g} s; allowed: slower ones, or a shorter time.duration_s")
+    raise Refused(f"{scene.name}: Lyapunov exponents: tangent vectors become nearly parallel within"
+                  f" {scene.duration / MOST_PIECES:.3g} s; allowed: slower decay, or a shorter time.duration_s")
 
 
 def _growth(scene: Scene, places: list[int], accuracy: float, pieces: int) -> Array | None:

@@ -82,8 +82,8 @@ again = Ends()
     [
         ("broken_laws:end", "left controller broken_laws:end: SystemExit, .*line 3, tick 0"),
         ("broken_laws:close", "left controller broken_laws:close: GeneratorExit, .*line 4, tick 0"),
-        ("broken_laws:Fails", "Fails'> does not begin: ValueError: words, .*line 9"),
-        ("broken_laws:again", "does not begin: SystemExit, .*line 11"),
+        ("broken_laws:Fails", "Fails'> cannot be initialised: ValueError: words, .*line 9"),
+        ("broken_laws:again", "cannot be initialised: SystemExit, .*line 11"),
         ("divides_by_0:law", "divides_by_0 cannot be imported: ZeroDivisionError: division by zero, .*line 1"),
         ("ends_at_once:law", "ends_at_once cannot be imported: SystemExit: 0, .*line 1"),
         ("./broken_laws:end", "left=./broken_laws:end is not allowed; allowed: module:object"),

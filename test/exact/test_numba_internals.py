@@ -77,7 +77,7 @@ def test_a_damaged_kernel_is_compiled_anew_and_says_so_once(cached: Path, caplog
     for content in damaged(whole):
         assert answer(cached, content) == (42.0, False)
         [said] = caplog.messages
-        assert said.endswith("is damaged; what cannot be loaded is compiled anew")
+        assert said.endswith("is damaged; kernels that cannot be loaded are compiled again")
         caplog.clear()
         assert answer(cached, cached.read_bytes()) == (42.0, True)  # it has been written again
         assert not caplog.messages

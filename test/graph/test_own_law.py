@@ -147,7 +147,7 @@ def test_whatever_a_law_raises_in_the_graph_is_its_own(here: Path, source: str, 
 )
 def test_what_is_no_command_is_refused_in_the_same_words(here: Path, answer: str, told: str) -> None:
     (here / "needs_here.py").write_text(f"law = lambda *_: {answer}")
-    case, words = scenes.load("case_01", [SHORT]), f": it answered {told} at tick 0, t = 0.0 s; allowed: a finite numb"
+    case, words = scenes.load("case_01", [SHORT]), f": it returned {told} at tick 0, t = 0.0 s; allowed: a finite numb"
     with pytest.raises(Refused, match=f"^law: needs_here:law{words}"):
         OwnLaw("needs_here:law").command(case.system, LEFT, 0, 0.0, [0.0] * 6)
     with pytest.raises(Refused, match=f"^left controller needs_here:<lambda>{words}"):

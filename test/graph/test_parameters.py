@@ -229,7 +229,7 @@ NOT_BEGUN = {  # variables of the environment, and what a node says of them
     "ROS_LOG_DIR=/proc/nowhere": "ROS does not start: .*'/proc/nowhere'.* ROS_LOG_DIR=/proc/nowhere",
     "ROS_SECURITY_ENABLE=true ROS_SECURITY_STRATEGY=Enforce": "ROS does not start: .*ROS_SECURITY_STRATEGY=Enforce",
     "ROS_STATIC_PEERS=no.such.host.invalid": "Unable to resolve peer no.such.host.invalid.* ROS_STATIC_PEERS=no",
-    "": "grasp: left_controller: law: laws:Camera: .* does not begin: ValueError: no camera, .*laws.py, line 3$",
+    "": "grasp: left_controller: law: laws:Camera: .* cannot be initialised: ValueError: no camera, .*laws.py, line 3$",
 }
 
 

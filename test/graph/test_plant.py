@@ -101,7 +101,7 @@ def test_a_file_of_parameters_for_another_node_is_named(launch: Any, tmp_path: P
     first = plant.stderr.readline()
     plant.terminate()
     plant.communicate(timeout=DEADLINE)
-    assert first.endswith("[plant]: no parameter file has anything for /plant\n")
+    assert first.endswith("[plant]: no parameter file has values for /plant\n")
 
 
 def test_one_file_of_parameters_is_for_all_nodes(launch: Any, tmp_path: Path) -> None:

@@ -141,9 +141,9 @@ def test_8_and_9_what_a_method_does_not_declare_is_refused(name: str) -> None:
       "right_contact"), "lacks left_contact, object, right_contact")],
 )
 def test_9_the_refusal_names_what_is_lacking(sections: tuple[str, ...], words: str) -> None:
-    with pytest.raises(Refused, match=rf"dop853: case_01 {words}; it knows the paper's grasp alone"):
+    with pytest.raises(Refused, match=rf"dop853: case_01 {words}; it supports only the paper's grasp"):
         check("dop853", scene_of("case_01", without=sections), None)
-    with pytest.raises(Refused, match=r"dop853: everything has .*left_sensor.*; it knows"):
+    with pytest.raises(Refused, match=r"dop853: everything has .*left_sensor.*; it supports"):
         check("dop853", scenes.load("everything"), None)
 
 

@@ -92,7 +92,7 @@ def test_a_tag_in_a_text_is_not_followed(tmp_path: Path, tag: str) -> None:
              "mode: x\nreal_time_factor: 1.0\ntimeouts: {left: 0.1}\n", "mode: x\nreactions: {left: zero}\n"],
 )
 def test_a_text_on_run_that_no_plant_says_is_refused(text: str) -> None:
-    with pytest.raises(Refused, match=r"^(run: not what a plant says|accuracy)"):
+    with pytest.raises(Refused, match=r"^(run: not a description of a run by a plant|accuracy)"):
         running.parse(text)
 
 

@@ -97,4 +97,4 @@ def say_compiling() -> None:
 @cache
 def say_damaged() -> None:
     """Say, once, that something on disk is of no use."""
-    LOG.warning("the kernel cache in %s is damaged; what cannot be loaded is compiled anew", _base())
+    LOG.warning("the kernel cache in %s is damaged; kernels that cannot be loaded are compiled again", _base())

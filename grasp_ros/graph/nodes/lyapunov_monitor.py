@@ -58,7 +58,7 @@ class LyapunovMonitor:
         if self._before is None and not self._acting:  # what came before is of the run before: topics keep the last one
             self._waiting[side].clear()
         if len(self._waiting[side]) >= MOST_WAITING:
-            raise Refused(f"{side}/parameters: more than {MOST_WAITING} laws that wait; allowed: at most that")
+            raise Refused(f"{side}/parameters: {MOST_WAITING} changes wait for their tick; allowed: at most that")
         self._waiting[side].append((stamp, numbers, cdr))
 
     def restart(self) -> None:

@@ -212,7 +212,7 @@ class Plant(PeerNode):
         self.finished = True
         ticks, seconds = self.scene.ticks, time.monotonic() - self._begin
         speed = ticks / seconds
-        self.get_logger().info(f"finished {ticks} ticks in {seconds:.1f} s: {speed:.1f} ticks/s with all pauses")
+        self.get_logger().info(f"finished {ticks} ticks in {seconds:.1f} s: {speed:.1f} ticks/s including pauses")
         self.heartbeats.end("")  # for the monitor, which may be in this thread
 
     def _show(self) -> None:

@@ -41,7 +41,7 @@ class ParameterNode(Node):
         with refusing():
             super().__init__(name, **options)
         if FILE in sys.argv and not self._parameter_overrides:  # the file may be for others, or the name is wrong
-            self.get_logger().info(f"no parameter file has anything for {self.get_fully_qualified_name()}")
+            self.get_logger().info(f"no parameter file has values for {self.get_fully_qualified_name()}")
 
     def create_service(self, kind: Any, name: str, callback: Callable[..., Any], **options: Any) -> Service:
         """As rclpy's, but that a request which rclpy itself cannot read is answered."""

@@ -160,7 +160,7 @@ class Remote(GraspNode):
             message = Parameter(name, value=value).to_parameter_msg()
             serialize_message(message)  # which a call would do, where it is too late to refuse
         except (TypeError, OverflowError, AssertionError, SystemError):  # of the library for what no message holds
-            raise Refused(f"{name}: {value} is not allowed; allowed: what a parameter of ROS can be") from None
+            raise Refused(f"{name}: {value} is not allowed; allowed: a type of ROS parameters") from None
         request = SetParameters.Request(parameters=[message])
         [result] = self._ask(SetParameters, f"{node}/set_parameters", request).results
         if not result.successful:

@@ -22,7 +22,7 @@ def _build(sections: Sections, system: System) -> None:
     if system.laws:
         system.caveats.append(HELD)
     if system.laws and system.delay:
-        system.caveats.append(f"commands come {system.delay} control periods late")
+        system.caveats.append(f"commands are delayed by {system.delay} control periods")
 
 
 def _odd(sections: Sections, system: System) -> Iterable[str]:

@@ -17,7 +17,7 @@ PARAMETERS = (
 
 def _build(side: str, sections: Sections, system: System) -> None:
     system.laws[SIDES[side]].row[Column.LIMIT] = sections[f"{side}_actuator"]["limit_N"]
-    system.caveats.append(f"the {side} command is limited, so that less damping may act than V_c counts on")
+    system.caveats.append(f"the {side} command is limited, so that less damping may act than V_c assumes")
 
 
 def _odd(side: str, sections: Sections, _: System) -> Iterable[str]:

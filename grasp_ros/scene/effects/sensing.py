@@ -31,7 +31,7 @@ def _build(side: str, sections: Sections, system: System) -> None:
         law.seed = numbers["noise_seed"], int(SIDES[side])
         system.caveats.append(f"the {side} arm is measured with noise")
     if law.row[[Column.POSITION_STEP, Column.VELOCITY_STEP]].any():
-        system.caveats.append(f"the {side} arm is measured in steps")
+        system.caveats.append(f"the {side} sensor quantises")
 
 
 def _odd(side: str, sections: Sections, system: System) -> Iterable[str]:
