@@ -26,20 +26,21 @@ def answer(claims: Sequence[Claim], found: Beyond) -> list[str]:
         f" {', '.join(tally(numbered))}.",
         f"Not so: {failing}." if failing else "None of them fails.",
         "The proof has a gap: V as printed jumps up where a pair separates faster than 1/p"
-        f" ({len(found.gap.jumps)} times in two scenes of ours). {_jumps(claims)} V_c, which keeps the term, never"
+        f" ({len(found.gap.jumps)} times in two of our scenes). {_jumps(claims)} V_c, which keeps the term, never"
         " rises, and closes the proof.",
-        "Stronger than what the paper claims: one contact that loses energy makes the origin globally attracting, even"
-        f" if no arm has a damper (proof: docs/certificate.md); it takes {lossless.together} s.",
-        f"With dampers the end is algebraic: V_c falls like t^(-5/2) (measured: t^{found.tail.slope:.3f}), and the"
+        "Stronger than the paper's claim: one dissipative contact makes the origin globally attracting, even if no arm"
+        f" has a damper (proof: docs/certificate.md); it takes {lossless.together} s.",
+        f"With dampers the decay is algebraic: V_c falls like t^(-5/2) (measured: t^{found.tail.slope:.3f}), and the"
         " touches never end.",
         f"Collisions slow arms that are damped: No. 1 settles after {standard.together} s with the object, after"
         f" {standard.alone} s without.",
-        f"Symmetric starts are a knife-edge: a nanometre is a millimetre after {min(row.visible for row in grown):.0f}"
-        f" to {max(row.visible for row in grown):.0f} s, and Figs. 6, 8 and 9 show a motion that nobody will see.",
-        f"No. 2, without losses, is chaos: its Lyapunov exponent is {found.chaos.exponent:.2f} +-"
+        "Symmetric initial states are unstable: an offset of a nanometre grows to a millimetre after"
+        f" {min(row.visible for row in grown):.0f}"
+        f" to {max(row.visible for row in grown):.0f} s, and the motion of Figs. 6, 8 and 9 cannot be observed.",
+        f"No. 2, without losses, is chaotic: its Lyapunov exponent is {found.chaos.exponent:.2f} +-"
         f" {found.chaos.error:.2f} /s.",
-        "Nothing is grasped in the sense of a grip: both arms are driven to one point, and press on nothing in the end"
-        " (T9); set-points that overlap do it.",
+        "The object is not gripped: both arms are regulated to the same point, and in the end press with no force"
+        " (T9). Overlapping set-points give a grip.",
         f"The paper's own method at a step of 10 ms is off by up to {coarse:.2g} m within 20 s.",
     ]
 

@@ -27,10 +27,10 @@ def doubts(cases: Cases) -> dict[str, str]:
     return {
         "Number of figures":
             'The text announces results "from Fig. 2 to Fig. 15"; the last figure is Fig. 12. Its list of cases ends'
-            " there, too, so that nothing seems to be missing but three figures that nobody describes.",
+            " there, too, so only three figures that are described nowhere seem to be missing.",
         "Axis of Fig. 10":
             f"It ends at -10 N. From rest the first input of No. 9 is -Kp x_r(0) = {-inputs:g} N on the right. Either"
-            " the curve leaves the figure or the start was another.",
+            " the curve leaves the figure or the initial state was different.",
         "Sign of x_l(0)":
             f"Table 1 prints +{LITERAL.x_l:g}. The left arm would start {LITERAL.x_l:g} m inside the object, pressed"
             f" with {force:.0f} N, and with V_c(0) = {levels[1]:.0f} J in place of {levels[0]:.2g} J. Read as"
@@ -48,12 +48,12 @@ def doubts(cases: Cases) -> dict[str, str]:
             " well.",
         "x_o(0)": "Not printed. Read as 0, in the middle of the axes of Figs. 2 to 12.",
         "Step of the integration":
-            "Not printed; what it does to the figures stands above, under the paper's own method.",
+            "Not printed; for its effect on the figures see above, under the paper's own method.",
         "Lyapunov's method in noncontact (p. 245)":
-            "The text says that the method cannot decide there, since V_o of (33) does not see x_o, and goes on part by"
-            " part, (29) to (37). It can: where both pairs are apart x_l < x_o < x_r, so that V of (28) is 0 only where"
-            " x_l = x_r = 0 encloses x_o = 0 and nothing moves; and where one separates faster than 1/p something"
-            " moves, so that V > 0. (28) is positive definite as it is printed; (29) to (37) are a detour.",
+            "The text says that the method does not apply there, since V_o of (33) does not contain x_o, and continues"
+            " part by part, (29) to (37). It does apply. If both pairs are apart, x_l < x_o < x_r, so V of (28) is 0"
+            " only if x_l = x_r = 0 encloses x_o = 0 and all bodies are at rest. If a pair separates faster than 1/p,"
+            " a body moves, so V > 0. (28) is positive definite as printed, and (29) to (37) are not needed.",
         '"In Fig. 1"':
             "The sentence on where x_l is larger than x_o (p. 246) can only mean Fig. 2: Fig. 1 is the model.",
     }

@@ -44,9 +44,10 @@ def results(found: Beyond) -> list[Result]:
 def _gap(found: Gap) -> Result:
     unsafe = [str(number) for number, p, safe in found.safe if p >= safe]
     text = (
-        "The proof shows that V falls within each condition of contact, and not that it does so between them. A pair"
-        " that separates faster than 1/p while it penetrates is noncontact by (10): its Hertz term leaves V, and comes"
-        f" back where u' rises through -1/p. V then jumps up: {len(found.jumps)} times in the two motions of the table."
+        "The proof shows that V falls within each contact mode, but not between modes. A pair"
+        " that separates faster than 1/p while it penetrates is noncontact by (10): its Hertz term is removed from V,"
+        f" and returns when u' rises through -1/p. V then jumps up: {len(found.jumps)} times in the two motions of the"
+        " table."
         f" V_c, which keeps the term whenever u > 0, never rises here (largest step {found.V_c_rise:.1e} V_c(0)), and"
         " docs/certificate.md proves that it cannot. Where p is below sqrt(mu / V_c(0)) no pair can separate so fast"
         " and the printed proof is complete; that covers all of the paper's cases but No."
@@ -59,13 +60,13 @@ def _gap(found: Gap) -> Result:
 
 def _tail(found: Tail) -> Result:
     text = (
-        "At the origin a contact has no linear stiffness, so that with C > 0 the end is algebraic and not exponential,"
-        " but for a start that is symmetric to the last bit: there the object rests, V_c falls exponentially (No. 8),"
-        " and the contacts are those of each arm with a wall. V_c tends to (4/5) H (kappa t)^(-5/2), here with kappa ="
-        f" {found.kappa:.6g} /(m s), from the damping C, the stiffness K, H and m_o alone. No. 1 has V_c / law ="
-        f" {found.constant:.4f} after {found.t[-1]:g} s, falls like t^{found.slope:.3f} over the last decade, and has"
+        "At the origin a contact has no linear stiffness, so that with C > 0 the decay is algebraic, not exponential."
+        " The exception is an initial state that is symmetric to the last bit: the object rests, V_c falls"
+        " exponentially (No. 8), and each arm hits it like a wall. V_c tends to (4/5) H (kappa t)^(-5/2), here with"
+        f" kappa = {found.kappa:.6g} /(m s), from the damping C, the stiffness K, H and m_o alone. No. 1 has V_c / law"
+        f" = {found.constant:.4f} after {found.t[-1]:g} s, falls like t^{found.slope:.3f} over the last decade, and has"
         f" touched {found.contacts[-1]:.0f} times by then, like t^{found.touches_slope:.3f} (the law: t^0.75). The"
-        " contacts go on for ever. Where C = 0 kappa is 0, and the law says nothing of No. 3."
+        " contacts never end. For C = 0 kappa is 0, and the law does not apply to No. 3."
     )
     decades = [int(np.argmin(np.abs(found.t - 10.0**power))) for power in range(2, 6)]
     return Result("tail", "The end is algebraic", text, [
@@ -81,11 +82,11 @@ def _chaos(found: Chaos) -> Result:
         f" largest Lyapunov exponent is {found.exponent:.3f} +- {found.error:.3f} /s over {found.t[-1]:g} s (standard"
         f" error of ten blocks), a factor of {np.exp(20.0 * found.exponent):.1e} in the 20 s of Fig. 3. In"
         f" {RETURN_SECONDS:g} s the motion comes back to its start no nearer than some {found.near:.2g} sqrt(V(0));"
-        f" after {-np.log(np.spacing(1.0)) / found.exponent:.0f} s or so what is computed is one of the motions that"
+        f" after {-np.log(np.spacing(1.0)) / found.exponent:.0f} s or so the computed motion is one of those that"
         " begin within rounding of this one."
         " From a start that is symmetric to the last bit the object rests and the arms are periodic: the return is"
         f" within {found.periodic:.1e}, and the exponent of offsets that keep the symmetry tends to 0"
-        f" ({found.symmetric:.3f} /s). Any other offset leaves that motion faster still, at {found.across:.2f} /s."
+        f" ({found.symmetric:.3f} /s). Other offsets grow even faster, at {found.across:.2f} /s."
     )
     printed, symmetric = (f"x_l(0) = {start.x_l:g}, x_r(0) = {start.x_r:g} m" for start in (PRINTED, SYMMETRIC))
     heads = "start", "Lyapunov exponent, 1/s", "nearest return, sqrt(V(0))", "at, s"
@@ -108,9 +109,9 @@ def _edge(rows: Sequence[Edge]) -> Result:
         f" figures show is one arm against a wall. An offset of {SMALLEST:g} m of one arm, which no experiment can"
         f" avoid, exceeds {1e3 * VISIBLE:g} mm after {min(row.visible for row in grown):.1f} to"
         f" {max(row.visible for row in grown):.1f} s in No. {', '.join(str(row.case) for row in grown)}: every touch"
-        " that comes a little early pushes the object, which then meets the other arm earlier still. Only No."
-        f" {', '.join(str(row.case) for row in robust)} forgets it, because its dampers act faster. So the settling"
-        f" times of the symmetric start belong to a motion that nobody will see: No. 5 needs"
+        " that is slightly early pushes the object, which then hits the other arm even earlier. Only in No."
+        f" {', '.join(str(row.case) for row in robust)} does the offset decay: the dampers act faster. So the settling"
+        " times of the symmetric start belong to a motion that cannot be observed: No. 5 needs"
         f" {named[5].settling[0]:.1f} s there and {named[5].settling[1]:.0f} s from {MOVED[1]:g} m beside it, No. 7"
         f" {named[7].settling[0]:.1f} and, from {MOVED[-1]:g} m, {named[7].settling[-1]:.1f} s. The same holds for the"
         " period of No. 2."
@@ -134,12 +135,13 @@ def _stiffer(rows: Sequence[Stiffer]) -> Result:
     end = "more than that" if last.settling.low > best.settling.high else "no more than the scatter"
     text = (
         f"Medians over {standard.starts} random starts, with the 95 % interval of each. Ten times the stiffness changes"
-        f" the settling time from {standard.settling} to {printed.settling} s. The arms alone do not care"
-        f" ({standard.alone} and {printed.alone} s: the envelope exp(-C t / 2m) does not know k). With the object a"
-        f" stiffer arm comes back sooner ({standard.rate:.2f} and {printed.rate:.2f} touches a second), meets it faster"
+        f" the settling time from {standard.settling} to {printed.settling} s. The arms alone are hardly affected"
+        f" ({standard.alone} and {printed.alone} s: the envelope exp(-C t / 2m) does not depend on k). With the object"
+        f" a stiffer arm returns sooner ({standard.rate:.2f} and {printed.rate:.2f} touches a second), hits it faster"
         f" ({standard.speed:.2f} and {printed.speed:.2f} m/s) and so loses more to impacts ({standard.share:.0%} and"
-        f" {printed.share:.0%} of the lost energy), since 1 - e = (2/3) p v to first order. It has an end: the medians"
-        f" from k = {min(flat):g} to {max(flat):g} N/m cannot be told from the lowest, and at {last.k:g} N/m it is"
+        f" {printed.share:.0%} of the lost energy), since 1 - e = (2/3) p v to first order. The benefit is limited:"
+        f" the medians from k = {min(flat):g} to {max(flat):g} N/m do not differ significantly from the lowest, and at"
+        f" {last.k:g} N/m it is"
         f" {last.settling} s, {end}. Touches, speeds and shares are those of the first {min(MANY, last.starts)} starts."
     )
     return Result("stiffer", "Stiffer arms settle sooner, up to a point", text, [{
@@ -153,12 +155,12 @@ def _damped(rows: Sequence[Damped]) -> Result:
     without = rows[0]
     later = [row for row in rows if row.C > 0.0 and row.later - 2.0 * row.error > 0.5]
     text = (
-        f"Medians over {without.starts} random starts, with the 95 % interval of each. Where the arms have no damper,"
-        f" impacts are all that stops them: {without.together} s with the object, never without. Where they have"
-        f" dampers it is the other way round: from C = {min(row.C for row in later):g} N s/m on, in most of the random"
+        f"Medians over {without.starts} random starts, with the 95 % interval of each. Without dampers only impacts"
+        f" stop the arms: {without.together} s with the object, never without. With dampers it is the opposite: from C"
+        f" = {min(row.C for row in later):g} N s/m on, in most of the random"
         " starts (by two standard errors) the arms settle later with the object between them than alone, because the"
-        " object has no damper, takes energy over and gives it back. That the term of (18) is negative compares V'"
-        " at one state, not two motions."
+        " object, which has no damper, absorbs energy and returns it. The negative term of (18) compares V' at one"
+        " state, not two motions."
     )
     return Result("damped", "Collisions slow arms that are damped", text, [{
         "C, N s/m": f"{row.C:g}", "with the object, s": str(row.together),
@@ -172,13 +174,12 @@ def _stepped(rows: Sequence[Stepped]) -> Result:
     fine, coarse = ([row for row in rows if row.step == step] for step in STEPS)
     elastic = {row.step: row for row in rows if row.case == 2}
     text = (
-        "The paper does not print its step. Its method (Runge-Kutta, contact decided at the ends of a step, time and"
+        "The paper does not print its step. Its method (Runge-Kutta, contact detected at the ends of a step, time and"
         f" state by linear interpolation) at 1 ms is off by up to {max(row.error for row in fine):.2g} m within 20 s,"
         f" at 10 ms by up to {max(row.error for row in coarse):.2g} m. In No. 2, where V_c is constant, it loses"
         f" {-elastic[STEPS[0]].drift:.1%} of it at 1 ms and {-elastic[STEPS[1]].drift:.0%} at 10 ms: a figure drawn"
         f" that way shows a decay that is not there. It finds between {min(row.touches for row in rows):.0%} and"
-        f" {max(row.touches for row in rows):.0%} of the touches; more than there are, where it is on another path by"
-        " then."
+        f" {max(row.touches for row in rows):.0%} of the touches, more than 100% where its motion has already diverged."
     )
     return Result("stepped", "What the paper's own method does to its figures", text, [{
         "No.": str(row.case), "step, ms": f"{1e3 * row.step:g}", "largest error, m": f"{row.error:.2g}",
