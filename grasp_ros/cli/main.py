@@ -1,10 +1,10 @@
 """`grasp`: the command line for everything that needs no ROS, and for starting the four processes together.
 
-Exit statuses: 0; 1 if a run failed, a bag lacks messages or does not prove itself, a limit is not kept, a fit does not
-identify a number or misses the motion, no setting reaches an accuracy, the standard output cannot be written, or this
-package has a fault, which shows its traceback; 2 for input that is refused, and a file that cannot be written, in one
-line; 130 after a Ctrl-C, or another signal that ends a process, but 0 of a `grasp run` that was interrupted while it
-recorded and whose bag has a tick.
+Exit statuses: 0; 1 if a run fails, a bag lacks messages or fails verification, a limit is exceeded, a fit does not
+identify a parameter or does not reproduce the motion, no setting reaches an accuracy, the standard output cannot be
+written, or for a bug in this package, with its traceback; 2 for invalid input or a file that cannot be written, with
+one line; 130 after a Ctrl-C, or another signal that ends a process, but 0 of a `grasp run` that was interrupted while
+it recorded and whose bag has a tick.
 """
 
 from __future__ import annotations

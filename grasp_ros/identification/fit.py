@@ -23,27 +23,28 @@ FARTHEST = 1.0  # a factor of ten, in y, beyond which it has no end
 
 def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
         against: Mapping[str, float] = MappingProxyType({}), by_sensors: bool = False) -> Fit:
-    """Estimate numbers of a scene from a measured motion, with confidence intervals.
+    """Estimate parameters of a scene from a measured motion, with confidence intervals.
 
-    Positive numbers are searched by their logarithm, and at last as they are; their intervals are symmetric, but never
-    below 0. The noise of each channel is estimated as well, and weights it.
+    Positive parameters are fitted by their logarithm, and finally by their value; their intervals are
+    symmetric, but never below 0. The noise of each channel is estimated as well, and weights the channel.
 
     Parameters
     ----------
     data : path, Recording or Trajectory
         A bag, a .npz file of `grasp simulate`, or a .csv file with columns as `Trajectory.to_csv` names them: `t_s`,
         and states, not all of which need be there. Inputs recorded at every tick act as recorded, unless a free
-        number belongs to a controller or an external force; then the scene's controllers act.
+        parameter belongs to a controller or an external force; then the scene's controllers act.
     free : sequence of str
-        "section.key" of numbers that enter smoothly: masses, stiffness, damping, H, p, gains, initial values.
+        "section.key" of parameters on which the motion depends smoothly: masses, stiffness, damping, H, p, gains,
+        initial values.
         "offset.x_left_m" is the offset of a sensor: measured minus true value.
     scene : Scene, optional
-        What is known, and the start of what is free; initial values that the data have at t = 0 start there. Default:
-        the scene of the data; a .csv file has none.
+        Known parameters, and starting values of the free ones; initial values that the data have at t = 0 start there.
+        Default: the scene of the data; a .csv file has none.
     against : mapping of str to float
-        Free numbers whose value is tested: whether the data reject it.
+        Free parameters and the values to test: whether the data reject them.
     by_sensors : bool
-        Of a bag: what the sensors of its scene have measured, with their noise, in place of the exact states.
+        For a bag: use the noisy measurements of the sensors of its scene instead of the exact states.
 
     Raises
     ------

@@ -130,15 +130,15 @@ def design(
     scene: Scene, free: Mapping[str, tuple[float, float]], minimise: str, subject_to: Mapping[str, float] | None = None,
     *, setup: Setup | None = None, seed: int = 0, progress: Callback | bool | None = None,
 ) -> Design:
-    """Choose numbers of a scene so that an outcome is small.
+    """Choose parameters of a scene that minimise an outcome.
 
     Parameters
     ----------
     scene : Scene
     free : mapping of str to (float, float)
-        Numbers to choose, "section.key", within ranges (low, high); keys of one value are joined by +.
+        Parameters, "section.key", with their ranges (low, high); keys that share one value are joined by +.
     minimise : str
-        One of `simulation.outcomes`; of a group the largest of its columns.
+        One of `simulation.outcomes`; for a group, the largest of its columns.
     subject_to : mapping of str to float, optional
         Largest values of outcomes.
     setup : Setup, optional
@@ -146,12 +146,12 @@ def design(
     seed
         See `search`.
     progress
-        As in `ensemble`, but a callable is told the number of simulations so far.
+        As in `ensemble`, but a callable gets the number of simulations so far.
 
     Raises
     ------
     Refused
-        If a number, a range, an outcome or a bound cannot be; and see `search`.
+        If a parameter, a range, an outcome or a bound is not allowed; and see `search`.
     """
     axes = []
     for name, ends in mapping("free", free).items():

@@ -35,9 +35,9 @@ def described(error: BaseException) -> str:
 
 
 class Refused(ValueError):  # noqa: N818 - it is what happens to the input, and no error of the package
-    """Input that is refused: names what, its value and what is allowed.
+    """Invalid input: the message names it, its value and what is allowed.
 
-    The middle of a very long value is left out, and control characters are shown as escapes.
+    The middle of a very long message is left out, and control characters are shown as escapes.
     """
 
     exit_status = 2

@@ -125,7 +125,7 @@ class Transition(IntEnum):
     CLAMP = 2  # u' falls through -1/p while u > 0
     REENTRY = 3  # u' rises through -1/p while u > 0
     STICK = 4  # the object comes to rest by friction
-    SLIP = 5  # what pushes the object exceeds its friction
+    SLIP = 5  # the force on the object exceeds its friction
 
 
 class Outcome(IntEnum):

@@ -1,4 +1,4 @@
-"""Scenes: strict YAML files that say everything about a run, and the effects that they are composed of."""
+"""Scenes: strict YAML files that define a run completely, and the effects that they are composed of."""
 
 from grasp_ros.scene.scene import PAPER, Scene, compose, load, names, parse
 from grasp_ros.scene.validation import SceneError

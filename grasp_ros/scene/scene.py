@@ -1,4 +1,4 @@
-"""Scenes: strict YAML files that say everything about a run.
+"""Scenes: strict YAML files that define a run completely.
 
 A scene is composed of effects, each a section of the file, see `grasp_ros.scene.effects`: what it does not name is not
 simulated. Every key carries its unit. Nothing is repaired: a file that is not exactly right is refused.

@@ -1,4 +1,4 @@
-"""Running a scene without ROS, and what comes of it."""
+"""Running a scene without ROS, and its results."""
 
 from grasp_ros.simulation.chunk import Setup
 from grasp_ros.simulation.ensemble import Table, ensemble

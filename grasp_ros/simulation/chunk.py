@@ -46,7 +46,7 @@ LEFT_OUT = -2  # in place of why a row ended
 
 
 class Setup(NamedTuple):
-    """Settings of the runs of an ensemble, besides the scene and its numbers.
+    """Settings of the runs of an ensemble, besides the scene and its parameters.
 
     Attributes
     ----------
@@ -57,9 +57,9 @@ class Setup(NamedTuple):
     sampled : bool
         See `simulate`.
     settled : float
-        Part of the largest initial displacement within which a run counts as settled.
+        Fraction of the largest initial displacement within which a run counts as settled.
     horizons : int
-        A run whose settling time is wanted goes on until V_c decides, for so many horizons at most.
+        A run whose settling time is requested continues until V_c proves it, for at most this many horizons.
     max_events, max_work : int
         Budgets of each row.
     """

@@ -40,14 +40,14 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class Table(Frozen):
-    """An ensemble: its numbers and its outcomes, a row for each run.
+    """An ensemble: its parameters and its outcomes, a row for each run.
 
     Attributes
     ----------
     scene : Scene
     setup : Setup
     changes : dict of str to array (n,)
-        Numbers by "section.key".
+        Values of parameters by "section.key".
     columns : dict of str to array (n,)
         Outcomes by the names of `outcomes.OUTCOMES`, and derivatives; nan in rows that were refused or stopped.
     status : array (n,)
@@ -96,7 +96,7 @@ class Table(Frozen):
         return frame
 
     def to_csv(self, path: str | os.PathLike[str] | BinaryIO) -> None:
-        """The same as a text file, by its path or open; units in brackets behind the names of the columns.
+        """The same as a text file, given by its path or open; column names have their unit in brackets.
 
         Raises
         ------
@@ -125,15 +125,15 @@ def ensemble(
     ----------
     scene : Scene
     changes : mapping of str to array (n,)
-        Numbers of the scene by "section.key", one for each row; without any there is one row, the scene itself.
+        Values of parameters by "section.key", one for each row; if empty there is one row, the scene itself.
     outcomes : sequence of str
         Columns or groups of `outcomes`.
     setup : Setup, optional
         Settings of the runs; the outcomes above replace its own.
     sensitivity : sequence of str, optional
-        Numbers, "section.key", by which the last states and V_c are differentiated through all impacts: columns such as
-        "x_left_end by KEY", each by the unit of its key. `V_c_end` is V_c there, and `corner` the time in s from which
-        on one-sided derivatives differ, see `differentiate.Sensitivity`; inf: they do not.
+        Keys with respect to which the last states and V_c are differentiated through all impacts: columns such as
+        "x_left_end by KEY". `V_c_end` is the last V_c, and `corner` the time in s from which on one-sided derivatives
+        differ, see `differentiate.Sensitivity`; inf: they do not.
     threads : int, optional
         Default: one for each core. The result does not depend on it.
     progress : callable or True, optional
@@ -142,7 +142,7 @@ def ensemble(
     Raises
     ------
     Refused
-        If a key or an outcome is not known, a number has no derivative, or a setting is outside its range.
+        If a key or an outcome is not known, a parameter has no derivative, or a setting is outside its range.
     """
     (setup, columns), variants = check(scene, setup, outcomes), Variants(scene, changes)
     keys = None if sensitivity is None else names("sensitivity", sensitivity)

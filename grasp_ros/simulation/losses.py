@@ -47,10 +47,10 @@ def power_lost(system: System, state: Array) -> Losses:
 
 
 def losses(run: Trajectory) -> Losses:
-    """Energy lost by each cause over the whole run, in J, or up to the last output time where these tell it.
+    """Energy lost by each cause over the whole run, in J, or up to the last output time if computed from these.
 
-    What a held command does is not a loss of Kv: under sampled feedback `feedback` is the work that the commands took
-    out of the arms, besides what they have stored in V_c. Half of what V_c fell by is the total less the work of
+    Under sampled feedback `feedback` is not the loss by Kv, but the work that the commands took out of the arms,
+    besides the energy that they have stored in V_c. Half of the decrease of V_c is the total minus the work of
     external forces.
 
     Raises

@@ -1,4 +1,4 @@
-"""What a motion amounts to in a few numbers: settling times, contacts, and the summary, which `grasp simulate` prints.
+"""Quantities that summarise a motion: settling times, contacts, and the summary, which `grasp simulate` prints.
 
 Settled is one definition for the whole package: no mass leaves 2 % of the largest initial displacement any more, for
 good, which V_c proves: it never rises, and its level bounds what follows, see `physics.lyapunov`. A run goes on past
@@ -63,7 +63,7 @@ def last_outside(t: Array, position: Array, distance: float) -> Array:
 
 
 def settling_times(run: Trajectory, horizons: int = HORIZONS) -> Array:
-    """When left arm, object and right arm settled for good, (3,) in s.
+    """Settling times of left arm, object and right arm, (3,) in s.
 
     Infinite: not proved by V_c within `horizons`, up to which an exact run continues, or within the output times of
     any other. nan: no proof, because V_c can rise here, or some mass is not driven to 0.
@@ -96,18 +96,18 @@ def may_settle(run: Trajectory) -> bool:
 
 
 def contact_intervals(run: Trajectory, side: str) -> Array:
-    """Begin and end of every stretch with u > 0 of the "left" or "right" arm, (n, 2) in s."""
+    """Begin and end of every interval with u > 0 of the "left" or "right" arm, (n, 2) in s."""
     return intervals(check_run(run), side_of(side))[:, :2]
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def summary(run: Trajectory) -> dict[str, Any]:
-    """Numbers of a run by names that end with their unit; what the run does not have is left out.
+    """Quantities of a run by names that end with the unit; those that the run does not have are left out.
 
     `settled_s` has infinity where V_c does not prove within `settled_within_s` that a mass has settled. Where V_c may
     rise, `last_outside_s` has the last times outside the same bound in its place.
     `touches` is left out for methods that do not look for them. V_c is twice the energy, at two times: half of
-    what it falls by between them is what was lost less the work of external forces.
+    its decrease is the energy lost minus the work of external forces.
     """
     scene, method = check_run(run).scene, METHODS[run.method]
     found: dict[str, Any] = {

@@ -50,7 +50,7 @@ def simulate(
     ----------
     scene : Scene
     grid : array (n,), s, optional
-        Ascending output times within the horizon: numbers, one number, or lengths of time of numpy or pandas. Default:
+        Ascending output times within the horizon: numbers, one number, or time differences of numpy or pandas. Default:
         2001 equidistant ones, or every control period if the feedback is sampled.
     sampled : bool
         False: feedback acts continuously, as in the paper, unless the scene itself has a `loop`. True: as in the
@@ -65,18 +65,18 @@ def simulate(
     max_work : int
         Budget of work, for `exact` alone: flights, Taylor steps, and evaluations of event functions.
     changes : mapping of int to mapping of str to float
-        Numbers of the scene by "section.key" that were set while it ran, by the tick from which they act; only for
-        sampled feedback. The run names such a controller in its `controllers`, as one in place of the scene's.
+        New values of parameters by "section.key", by the tick from which they apply; only for sampled feedback. The run
+        lists a controller with such a change in its `controllers`, like one in place of the scene's.
     controllers : mapping of str to callable
-        Controllers in place of the scene's feedback, "left" or "right": from the tick, its time in s, and what the
-        sensor of the scene measures of the arm, x in m and v in m/s, to a command in N, which is limited and delayed
-        as the scene says. Further parameters are given what their names ask for, see
-        `physics.observation.OBSERVABLES`. The loop is sampled. Each is called once for every tick, the last one
-        included. A function that numba has compiled and that asks for nothing more runs at full speed. A class is made
-        anew for the run; of any other object `reset()` is called before it, if it has one.
+        Controllers in place of the scene's feedback, "left" or "right": functions of the tick, its time in s, and the
+        measured x in m and v in m/s of the arm that return a command in N, which is limited and delayed as the scene
+        defines. Further parameters get the measurements of their names, see `physics.observation.OBSERVABLES`. The
+        loop is sampled. Each function is called once for every tick, including the last. A function compiled by numba
+        without further parameters runs at full speed. A class is instantiated for the run; any other object is reset
+        before it by `reset()`, if it has this method.
     sensitivity : sequence of str, optional
-        Numbers of the scene, "section.key", by which the motion is differentiated through its impacts, see
-        `Trajectory.sensitivity`. The run is made twice, because the times of events are outputs of the second one.
+        Keys of the scene, "section.key", with respect to which the motion is differentiated through its impacts, see
+        `Trajectory.sensitivity`. This takes two runs: event times of the first are output times of the second.
     progress : callable or True, optional
         True: a bar, in a terminal or in a notebook. A callable gets the time reached, in s: at the end of the
         horizon, if the run gets there, and on the way, except by methods with a fixed step.
@@ -85,8 +85,8 @@ def simulate(
     ------
     Refused
         If the grid is not ascending within the horizon, the changes are not those of a running graph, the method
-        cannot do what is asked, see `methods.registry.check`, or a controller cannot be called or answers what is no
-        finite number. What a controller raises passes through, with a note of the tick.
+        cannot do what is asked, see `methods.registry.check`, or a controller cannot be called or returns no
+        finite number. Exceptions of a controller are passed on, with a note of the tick.
     """
     check_scene(scene)
     changes, controllers = mapping("changes", changes), mapping("controllers", controllers)

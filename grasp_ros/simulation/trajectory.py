@@ -95,10 +95,10 @@ class Trajectory(Tabular, Frozen):
 
     @property
     def command(self) -> Array:
-        """What the controllers answered: f_l, f_r (n, 2) in N; 0 without a controller.
+        """Commands of the controllers: f_l, f_r (n, 2) in N; 0 without a controller.
 
-        In a sampled loop the answer to the last tick at or before the output time, as it left the controller: limited,
-        and not yet delayed. Under continuous feedback the answer to the state itself, (4), (5).
+        In a sampled loop the command of the last tick at or before the output time, limited but not yet delayed. Under
+        continuous feedback the command for the state itself, (4), (5).
         """
         if self.loop is not None:
             return self.loop.command
@@ -106,7 +106,7 @@ class Trajectory(Tabular, Frozen):
 
     @property
     def inputs(self) -> Array:
-        """What acted on the bodies from each output time on: forces (n, 3) in N by body, LEFT, RIGHT, OBJECT.
+        """Forces on the bodies from each output time on, (n, 3) in N by body, LEFT, RIGHT, OBJECT.
 
         In a sampled loop the commands that had arrived, limited and delayed, and the external forces, all of which stay
         the same up to the next tick. Under continuous feedback `command` and the external forces. NaN at the end of the
@@ -140,7 +140,7 @@ class Trajectory(Tabular, Frozen):
 
     @property
     def origin(self) -> dict[str, Any]:
-        """How the motion was integrated, and what became of it."""
+        """How the motion was integrated, and how the run ended."""
         return {"method": self.method, "setting": self.setting, "status": self.status.name}
 
     @property

@@ -21,8 +21,9 @@ ROS = ("use_sim_time", "start_type_description_service", "qos_overrides")  # par
 def page() -> str:
     """Parameters of all nodes, and the services of the plant."""
     parts = [
-        "# Nodes", "Executables `plant`, `left_controller`, `right_controller` and `monitor`. The numbers of a scene"
-        " are parameters too: of the plant, and those of a controller of that controller; see [scenes](scenes.md).",
+        "# Nodes", "Executables `plant`, `left_controller`, `right_controller` and `monitor`. The keys of a scene"
+        " are node parameters, too: of the plant or, in the section of a feedback, of that controller; see"
+        " [scenes](scenes.md).",
     ]
     with _nodes() as nodes:
         for name, node in nodes.items():

@@ -37,8 +37,8 @@ PUBLIC = {  # modules and their public names; what has `__all__` says it itself,
 
 def python() -> str:
     """The public Python interface, for mkdocstrings to fill in."""
-    parts = ["# Python", "All numbers are SI. What stands here is public and stays within a release. The site,"
-             " which `make docs` builds, has arguments and results, too; so has `help(...)`."]
+    parts = ["# Python", "All quantities are in SI units. The names on this page are public and do not change within"
+             " a release. Arguments and results are in the site, which `make docs` builds, and in `help(...)`."]
     known: set[str] = set()
     for name, listed in PUBLIC.items():
         module = importlib.import_module(name)

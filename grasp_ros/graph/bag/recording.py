@@ -29,14 +29,14 @@ from grasp_ros.simulation.tables import Tabular
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Recording(Tabular, Frozen):
-    """What is in a bag.
+    """The contents of a bag.
 
     Attributes
     ----------
     path : Path
     scene : Scene
     versions : dict of str to str
-        What the recording process ran with.
+        Software versions of the recording process.
     counts : dict of str to int
         Messages by topic.
     tick : int array (n,)
@@ -150,9 +150,9 @@ class Recording(Tabular, Frozen):
         return {"bag": str(self.path), "run": self.running.words, "end": self.lost["end"]}
 
     def simulated(self) -> Trajectory:
-        """The motion without ROS, under the forces that the bag has: with events, contacts, sections, any time between.
+        """The motion simulated again without ROS under the recorded forces: with events, contacts, sections, any time.
 
-        Its states are those of the bag, bit for bit, if `verify` holds. Commands are here what acts after the delay.
+        Its states are those of the bag, bit for bit, if `verify` holds. Its commands are those after the delay.
 
         Raises
         ------

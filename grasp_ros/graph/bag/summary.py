@@ -1,4 +1,4 @@
-"""What is in a bag in a few numbers, as data: what `grasp inspect` prints, with `--json` and as a table."""
+"""Quantities that summarise a bag, as data: what `grasp inspect` prints, with `--json` and as a table."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from grasp_ros.scene.topics import LYAPUNOV_NAMES
 
 
 def summary(recording: Recording) -> dict[str, Any]:
-    """Numbers of a bag by names that end with their unit; what the bag does not have is left out.
+    """Quantities of a bag by names that end with the unit; those that the bag does not have are left out.
 
     V is twice the energy. `topics` are those that have a message; their rates are means over the bag's time. `contacts`
     is how often a pair began to touch, as far as the ticks show it.

@@ -1,4 +1,4 @@
-"""A bag proves itself: its scene is simulated again with the inputs that it recorded, whatever controller gave them.
+"""Verification of a bag: its scene is simulated again with the recorded inputs, whatever controller produced them.
 
 Every state must have the same bits, and so must all that follows from states and commands: the forces that acted, the
 impact forces, and what the monitor computed. Which law gave the commands is a question of its own, see `laws_of`.
@@ -139,7 +139,7 @@ def _same_without_ros(recording: Recording, answers: dict[str, Answers]) -> bool
 
 
 def laws_of(recording: Recording) -> dict[str, str]:
-    """What `answers_of` says, in words."""
+    """Whether the commands are those of the scene's law, in words, by side; see `answers_of`."""
     return {side: str(answers) for side, answers in answers_of(recording).items()}
 
 
