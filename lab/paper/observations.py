@@ -94,8 +94,8 @@ class Gripped(NamedTuple):
         held = motion.holds_on(scenes.load("preload"))
         return Part(
             "With set-points that allow it both arms press the object in the end.", motion.holds_on.threshold,
-            "Both arms are regulated to the same point, so that no deformation is left to press with; set-points that"
-            " overlap leave one.",
+            "Both arms are regulated to the same point, so that in the end there is no deformation and no force;"
+            " overlapping set-points produce both.",
             (Check(Kind.PRINTED, "the cases with dampers", f"{share:.0%} of {len(own)}", share, share == 1.0),
              Check(Kind.PRINTED, "set-points that overlap by 50 mm, scene preload", f"{held.value:.3g} N",
                    float(held.holds), held.holds)),
@@ -123,7 +123,7 @@ BETWEEN = "An unequal pair lies between the equal ones: "
 CONTACTS = "Read as: unequal contacts, too. "
 UNEQUAL_PAIRS = (  # conclusion (3), and the second half of observation (8)
     _unequal("m", 10.0, 6, f"{BETWEEN}the envelope exp(-C t / 2m) is slow in one arm, and in two of two heavy arms."),
-    _unequal("m", 0.1, 1, "The lighter arm stops sooner, and then hardly hinders the object on its way to the other."),
+    _unequal("m", 0.1, 1, "The lighter arm stops sooner, and then hardly slows the object down."),
     _unequal("k", 10.0, 1, "Arms of different periods meet the object at different times and keep it moving, and a"
              " stiff arm, which hardly gives way, takes little from it."),
     _unequal("c", 10.0, 1, f"{BETWEEN}one damper more is better than none more, and worse than two."),
@@ -202,7 +202,8 @@ OBSERVATIONS = numbered("O", "p. 247, observation", {
         Comparison("The largest input force of No. 9 is above that of No. 1.", "input", Variant(9), HIGHER,
                    "From rest the largest input is Kp x(0), unless Kv v exceeds it later.", *tenfold("Kp")),
         Comparison("No. 9 needs longer to settle than No. 1.", "settling", Variant(9), HIGHER,
-                   "The envelope of an arm, exp(-C t / 2m), does not know Kp; more and faster impacts take more.",
+                   "The envelope of an arm, exp(-C t / 2m), does not depend on Kp; more and faster impacts dissipate"
+                   " more.",
                    *tenfold("Kp"), (*SETTLING, "swings")),
         Share("The damping ratio of an arm falls.", less_damped, "K grows and C does not.",
               (9, STANDARD), *tenfold("Kp"))],
@@ -223,15 +224,15 @@ OBSERVATIONS = numbered("O", "p. 247, observation", {
 CONCLUSIONS = numbered("C", "p. 248, conclusion", {
     "Lyapunov's direct method proves that a grasp with collisions can be stable.": [
         Universal("In the paper's cases the printed V never rises.", motion.paper_V_falls,
-                  "V jumps only where a pair that separates at 1/p takes its Hertz term up again (next part).",
+                  "V jumps only where the Hertz term of a pair that separates at 1/p returns (next part).",
                   letter="H", values=(1e2, 1e3, 1e5)),
         Universal("In the paper's cases no pair separates faster than 1/p while it penetrates.",
                   motion.separates_slowly,
                   "Where p is below sqrt(mu / V_c(0)) none can (theorem 2 of docs/certificate.md); No. 4 is beyond"
-                  " that, touches faster than 1/p, and still leaves more slowly, since impacts take speed.",
+                  " that, approaches faster than 1/p, but separates more slowly, since impacts dissipate energy.",
                   letter="p", values=(0.01, 0.3, 1.0)),
         Universal("The printed V never rises, whatever p.", motion.paper_V_falls,
-                  "A pair that separates faster than 1/p leaves V with its Hertz term and brings it back: V jumps up.",
+                  "The Hertz term of a pair that separates faster than 1/p is removed from V and returns: V jumps up.",
                   (1, 4), *ANY_P, extra=JUMPING),
         Universal("V_c, which keeps the Hertz term whenever u > 0, never rises, whatever p.", motion.repaired_V_falls,
                   "It is continuous, and all terms of its rate are losses (theorem 1 of docs/certificate.md).",

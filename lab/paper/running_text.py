@@ -53,29 +53,29 @@ def _long(cases: Cases) -> Scene:
 RUNNING_TEXT = (
     Statement("T1", "p. 244 to 245, (18), (20), (23), (25), (27)", "V never grows within a condition of contact.", [
         Universal("V' <= 0 at every instant.", motion.rate_is_never_positive,
-                  "With a = b = 4/5 the elastic terms cancel; what is left are losses, whose sign is algebra: no motion"
-                  " can break it.", NUMBERS, *ANY_P)]),
+                  "With a = b = 4/5 the elastic terms cancel; the remaining terms are <= 0 for every state.", NUMBERS,
+                  *ANY_P)]),
     Statement("T2", AFTER_34, "An object that rests off its origin stays there unless a force from outside acts.", [
         Universal("It rests until an arm touches it.", motion.object_rests_until_touched,
                   "Without contact nothing pushes the object, (3).", NUMBERS, *ANY_MASS)]),
     Statement("T3", AFTER_34, "The same sentence (T2), read as for good: an object off its origin stays there.", [
         Universal("It rests for good.", motion.object_stays,
-                  "The arms swing to 0 and meet the object on their way; the only common rest is the origin, as T5"
-                  " says.", NUMBERS, *ANY_MASS)]),
+                  "The arms swing to 0 and meet the object on their way; the only common equilibrium is the origin"
+                  " (T5).", NUMBERS, *ANY_MASS)]),
     Statement("T4", "p. 245, (35) to (37)", "The arms enclose the object but for the largest deformation.", [
         Universal("x_l - eps_l <= x_o <= x_r + eps_r at all times.", motion.enclosed,
                   "It is the definition of eps; that eps is bounded follows from V_c: eps <= (5 V_c(0) / 4H)^(2/5).",
                   NUMBERS, *ANY_P)]),
     Statement("T5", "p. 245, after (37)", "x_l and x_r converge to zero in any condition, and x_o with them.", [
         Universal("All masses settle, with or without losses.", motion.converges,
-                  "It takes one loss, of dampers (C > 0) or of impacts (p > 0); No. 2 has none, keeps its V_c, and is"
-                  " the counterexample to any condition.", NUMBERS, "p", (0.0, 1.0, 10.0), base=2),
+                  "One kind of dissipation is needed, by dampers (C > 0) or by impacts (p > 0); No. 2 has none, its"
+                  " V_c is constant, and it is the counterexample.", NUMBERS, "p", (0.0, 1.0, 10.0), base=2),
         Universal("All masses settle where the arms have dampers.", motion.converges,
                   "Every swing and every impact takes energy until none is left.",
                   DAMPED, "p", (0.0, 0.1, 1.0, 10.0))]),
     Statement("T6", AFTER_27, "The collision term makes V fall faster than without it.", [
         Universal("The collision terms of (18) are never negative.", motion.collision_term_lowers,
-                  "p H u^(3/2) u'^2 is a product of squares and positive numbers: algebra; no motion can break it.",
+                  "p H u^(3/2) u'^2 is a product of non-negative factors, for every state.",
                   NUMBERS, *ANY_P)]),
     Statement("T7", AFTER_27, "The term makes V' smaller than without it, which implies that collision stabilises.", [
         _with_loss(1, 4, 8, 10), *map(_alone, (1, 8, 10))]),
@@ -86,27 +86,27 @@ RUNNING_TEXT = (
         LOSSY_IMPACTS]),
     Statement("T9", "p. 248, conclusion (1), and the title", "What is controlled is a grasp, position and force.", [
         Universal("Both arms press the object in the end.", motion.holds_on,
-                  "Both arms are regulated to the same point: no deformation is left to press with.", extra=(
+                  "Both arms are regulated to the same point: in the end there is no deformation and no force.", extra=(
                       ("set-points that overlap by 50 mm, scene preload", lambda _: scenes.load("preload")),))]),
     Statement("T10", "p. 246, method", "Linear interpolation gives the exact time of a contact.", [
         *(Universal(f"With a step of {1e3 * step:g} ms it is exact.", motion.first_contact_error.of(step),
-                    "Interpolation between the ends of a step leaves h^2 |u'' / u'| / 8; only without damping, from x_o"
-                    " = 0, is u'' = 0 at the touch.", NUMBERS, "Kv", (0.0, 5.0)) for step in STEPS),
+                    "Linear interpolation over a step h has the error h^2 |u'' / u'| / 8; u'' = 0 at the touch only"
+                    " without damping, from x_o = 0.", NUMBERS, "Kv", (0.0, 5.0)) for step in STEPS),
         *(Universal(f"Read as: exact to the second order of a step of {1e3 * step:g} ms.", motion.second_order.of(step),
                     "That is what linear interpolation can do.", NUMBERS, "Kv", (0.0, 5.0), reading=True)
           for step in STEPS)]),
     Statement("T11", "p. 246, method", "The method can follow any number of collisions: nothing limits it.", [
         *(Universal(f"With a step of {1e3 * step:g} ms it goes on to the end, however many touches come.",
-                    motion.goes_on.of(step), "Every step decides anew what is in contact; nothing counts.",
+                    motion.goes_on.of(step), "Every step determines the contacts anew; their number is not limited.",
                     NUMBERS, "H", (1e2, 1e5), extra=((f"No. 2 over {LONG:g} s", _long),)) for step in STEPS),
         *(Universal(f"Read as: it finds every touch, with a step of {1e3 * step:g} ms.", motion.none_missed.of(step),
-                    "Contact is decided at the ends of a step; what opens and closes in between is not seen. Above 1"
-                    " the motion is on another path by then.", NUMBERS, "H", (1e2, 1e5), reading=True)
+                    "Contact is detected at the ends of a step; contacts in between are missed. Above 1 the motion has"
+                    " already diverged.", NUMBERS, "H", (1e2, 1e5), reading=True)
           for step in STEPS)]),
     Statement("T12", "p. 246, No. 2", "No. 2 goes on periodically and neither diverges nor converges.", [
-        Universal("It neither diverges nor converges.", motion.keeps_V, "There is no term left in V_c'.",
+        Universal("It neither diverges nor converges.", motion.keeps_V, "All terms of V_c' are 0.",
                   (2,), *ANY_H, base=2),
         Universal("It is periodic.", motion.returns,
                   "Three masses with impacts have no common period, but for a start that is symmetric to the last bit,"
-                  " where the object rests; it rests on a knife-edge.", (2,), *ANY_H, base=2)]),
+                  " where the object rests; that motion is unstable.", (2,), *ANY_H, base=2)]),
 )
