@@ -88,7 +88,7 @@ def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> M
     elif isinstance(source, Trajectory):
         found = _of_trajectory(source, name)
     elif scene is None:
-        raise Refused(f"{name}: a table does not name its scene; allowed: with a scene given")
+        raise Refused(f"{name}: a table does not name its scene; allowed: with a scene (--scene, or scene=)")
     else:
         found = _of_table(path, scene)
     if scene is not None:

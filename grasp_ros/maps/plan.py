@@ -54,16 +54,14 @@ class Axis(NamedTuple):
 
 def read_axis(option: str, text: str, grid: bool = True) -> Axis:
     """An axis from "section.key[+section.key]=low:high[:n[:log]]"; n only of a grid. Another text is refused."""
-    allowed = (
-        "allowed: section.key=low:high, + between keys with one value; then :n for 2 to"
-        f" {MOST:,} values; then :log for a log scale"
-    )
+    then = f"; then :n for 2 to {MOST:,} values; then :log" if grid else "; then ::log"
+    allowed = f"allowed: section.key=low:high, + between keys with one value{then} for a log scale"
     match = re.fullmatch(r"([\w.+]+)=([^:]+):([^:]+)(?::(\d*)(?::(log))?)?", text)
     if match is None:
         raise Refused(f"{option} {text}: not understood; {allowed}")
     name, low, high, points, log = match.groups()
     if points and not grid:
-        raise Refused(f"{option} {text}: n={points} is for a map's axes; allowed: low:high or low:high::log")
+        raise Refused(f"{option} {text}: n={points} is for a map's axes; {allowed}")
     try:
         return Axis(name, read_number(low), read_number(high), int(points or POINTS), bool(log))
     except ValueError:

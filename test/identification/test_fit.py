@@ -281,7 +281,7 @@ HELD = "".join(f"{line},{'input_left_N,input_object_N,input_right_N' if line[0] 
 
 
 @pytest.mark.parametrize(("content", "words", "complaint"), [
-    (ROWS, ("--free", P_LEFT), "a table does not name its scene; allowed: with a scene given"),
+    (ROWS, ("--free", P_LEFT), "a table does not name its scene; allowed: with a scene (--scene, or scene=)"),
     (ROWS, ("--scene", "case_01", "--free", "left_contact.hertz"), f"did you mean {H_LEFT}"),
     (ROWS, ("--scene", "case_01", "--free", "time.duration_s"), "has no derivative: it moves ticks"),
     (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--free", P_LEFT), "given twice"),

@@ -346,7 +346,7 @@ def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureF
         (["--x", f"{GAIN}=1:2", "--outcome", "joy"], "outcome joy: not known; allowed: settling_time"),
         (["--vary", f"{GAIN}=1:2"], "--vary: allowed: with --sample N"),
         (["--x", f"{GAIN}=1:2:2", "--seed", "1"], "--seed: allowed: with --sample N"),
-        (["--x", f"{GAIN}=1:2:3", "--sample", "9"], "n=3 is for a map's axes; allowed: low:high or low:high::log"),
+        (["--x", f"{GAIN}=1:2:3", "--sample", "9"], "n=3 is for a map's axes; allowed: section.key=low:high"),
         (["--x", f"{GAIN}=1:2", "--settled", "2"], "settled: 2.0"),
         (["--x", f"{GAIN}=1:2:99999", "--y", "object.mass_kg=1:2:99999"], "axes: 9,999,800,001 runs; allowed: at most"),
         (["--x", f"{GAIN}=1:2:2", "--scheduler", "tcp://127.0.0.1:9"], "nobody answers"),
