@@ -2,7 +2,8 @@
 
 Settling times jump from swing to swing, and the best choice often lies beside such a jump, where no derivative points
 to it. So it is sought by what needs none, differential evolution (R. Storn and K. Price, J. Global Optim. 11, 1997):
-each generation is one ensemble.
+each generation is one ensemble. It begins with the best of a sample, as an outcome may exist in a small part of the
+ranges only.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -29,6 +30,7 @@ from grasp_ros.simulation.ensemble import ensemble
 from grasp_ros.simulation.outcomes import GROUPS, find, wanted_by
 from grasp_ros.simulation.progress import Callback, showing
 
+SAMPLE = 512  # choices, of which the best are members of the first generation
 MEMBERS, GENERATIONS = 16, 500  # members of a population for each free number; generations at most
 AGREE = 1e-14  # standard deviation of what a population reaches, relative, at which a search ends
 BESIDE = 0.01  # part of a range, from whose end a choice is so far that it is tried, too
@@ -201,13 +203,15 @@ def search(problem: DesignProblem, seed: int = 0, progress: Callback | None = No
         return bool(agreed > (0 if done else PLATEAU))
 
     found = differential_evolution(
-        function, [(0.0, 1.0)] * len(problem.axes), popsize=MEMBERS, maxiter=GENERATIONS, tol=0.0, atol=-1.0, rng=seed,
-        polish=False, init="sobol", updating="deferred", vectorized=True, callback=is_over)  # never by its own rule
+        function, [(0.0, 1.0)] * len(problem.axes), init=_first_members(function, len(problem.axes), seed), rng=seed,
+        maxiter=GENERATIONS, tol=0.0, atol=-1.0, callback=is_over,  # never by its own rule
+        polish=False, updating="deferred", vectorized=True)
     ends = np.where(np.abs(found.x - np.rint(found.x)) < BESIDE, np.rint(found.x), found.x)
     single = np.where(np.eye(len(ends), dtype=bool), ends, found.x)
-    places = np.unique(np.vstack([found.x, ends, single]), axis=0)  # a population may stop just before an end
+    places = np.vstack([ends, single, found.x])  # a population may stop just before an end
     reached = function(places.T)
-    place, least = places[int(np.argmin(reached))], float(reached.min())
+    least = float(reached.min())
+    place = places[int(np.argmax(reached <= least + AGREE * abs(least)))]
     best = problem.numbers(place[None])
     tried = problem.found(best)
     if least >= BROKEN:
@@ -222,6 +226,24 @@ def search(problem: DesignProblem, seed: int = 0, progress: Callback | None = No
     return Design(problem.scene.changed(numbers), numbers, outcomes, runs)
 
 
+def _first_members(function: Callable[[Array], Array], axes: int, seed: int) -> Array:
+    """Members (n, axes) of the first generation: half of them the best of a sample, half spread over the ranges.
+
+    Where few choices have the outcome, as many again are tried beside them: a generation of copies would not move.
+    """
+    from scipy.stats.qmc import Sobol
+
+    rng, half = np.random.default_rng(seed), MEMBERS * axes // 2
+    sample = Sobol(axes, rng=rng).random(max(SAMPLE, 2 ** math.ceil(math.log2(2 * half))))
+    spread, reached = sample[:half], function(sample.T)
+    there = sample[reached < NOTHING]
+    if 0 < len(there) < half:
+        apart = rng.uniform(-1.0, 1.0, sample.shape) * len(sample) ** (-1.0 / axes)  # to the next choices of the sample
+        beside = np.clip(there[rng.integers(len(there), size=len(sample))] + apart, 0.0, 1.0)
+        sample, reached = np.vstack([sample, beside]), np.concatenate([reached, function(beside.T)])
+    return np.vstack([sample[np.argsort(reached, kind="stable")[:half]], spread])
+
+
 def _why_none(problem: DesignProblem, nearest: Found) -> str:
     """What keeps the choice that breaks the bounds least from being one."""
     if nearest.stops:
@@ -230,6 +252,9 @@ def _why_none(problem: DesignProblem, nearest: Found) -> str:
         return "; the nearest has " + ", ".join(f"{name} {value[0]:.6g}" for name, value in nearest.outcomes.items())
     if wanted_by(find(problem.names)) & Wanted.SETTLING:
         return f"; {problem.scene.why_unsettled(problem.setup.sampled)}; last_outside needs no proof"
+    if wanted_by(find(problem.names)) & Wanted.BOUND:
+        return ("; a mass is outside the bound at the end of every run; allowed: a longer time.duration_s, or ranges"
+                " in which all come to rest")
     return ""
 
 

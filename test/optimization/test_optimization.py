@@ -51,6 +51,16 @@ def test_a_search_does_not_end_where_many_choices_are_alike() -> None:
     assert max(found) == pytest.approx(-0.00097076, rel=1e-4)
 
 
+@pytest.mark.parametrize("most", [30.0, 300.0])
+def test_an_outcome_that_a_small_part_of_a_range_has_is_found_by_every_seed(most: float) -> None:
+    """Gains from 4.97 to 6.11: some seeds ended at copies of one choice, elsewhere, others found none."""
+    scene = gr.load("case_01", ["time.duration_s=1"])
+    found = [gr.design(scene, {BOTH_KV: (0.5, most)}, "last_outside", seed=seed) for seed in range(4)]
+    gains = np.linspace(4.9, 5.1, 2001)
+    least = gr.ensemble(scene, dict.fromkeys(BOTH_KV.split("+"), gains), ["last_outside"])
+    assert max(own.outcomes["last_outside"] for own in found) <= np.nanmin(least.columns["last_outside"])
+
+
 def test_a_choice_at_the_end_of_a_range_is_found_there() -> None:
     found = gr.design(gr.load("case_01", ["time.duration_s=3"]), {"left_feedback.velocity_gain_Ns_per_m": (0.5, 10.0)},
                       "peak_impact_left", {"peak_input_left": 2.0})
@@ -117,6 +127,12 @@ def test_a_bound_that_no_choice_keeps_is_named_where_the_outcome_is_missing_as_w
     scene = gr.load("case_01", ["time.duration_s=2"])
     with pytest.raises(gr.Refused, match=r"<= 0.001; the nearest has last_outside inf, peak_input 2\.5$"):
         gr.design(scene, {BOTH_KV: (1.0, 2.0)}, "last_outside", {"peak_input": 1e-3})
+
+
+def test_runs_that_are_too_short_are_named_as_the_reason() -> None:
+    scene = gr.load("case_01", ["time.duration_s=0.2"])
+    with pytest.raises(gr.Refused, match=r"outside the bound at the end of every run; allowed: a longer"):
+        gr.design(scene, {BOTH_KV: (0.5, 30.0)}, "last_outside")
 
 
 def test_a_settling_time_that_nothing_proves_is_refused_with_the_reason() -> None:
