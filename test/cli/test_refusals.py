@@ -105,7 +105,7 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("simulate case_01 --method rk4 --sampled", "rk4: only continuous feedback"),
         ("simulate case_01 --method paper --tolerance 1", "--tolerance is not allowed; allowed for paper: --step"),
         ("simulate case_01 --method rk4 --accuracy 1e-8", "--accuracy is not allowed; allowed for rk4: --step"),
-        ("simulate hammer --method rk4", "rk4: hammer lacks right_arm, right_contact, right_feedback; it knows"),
+        ("simulate hammer --method rk4", "rk4: hammer lacks right_arm, right_contact, right_feedback; it supports"),
         ("simulate case_01 -o there.npz", "there.npz: cannot be written: Is a directory"),
         ("simulate case_01 -o a.txt", "a.txt: .txt is not allowed; allowed: .npz, .csv"),
         ("simulate case_01 -o ", ".: needs an ending, one of .npz, .csv"),

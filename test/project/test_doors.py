@@ -127,7 +127,7 @@ def store(path: Path, arrays: dict[str, np.ndarray], **members: bytes | None) ->
 @pytest.mark.parametrize(
     ("members", "complaint"),
     [
-        ({"t": None}, "digest: "), ({"more": b"x"}, "more: no array"), ({"t": b""}, "t: no array"),
+        ({"t": None}, "digest: "), ({"more": b"x"}, "more: not a NumPy array"), ({"t": b""}, "t: not a NumPy array"),
         ({"t": header("'|O'", "(5,)") + b"cos\nsystem\n(S'true'\ntR."}, "t: Object arrays cannot be loaded"),
         ({"t": header("'<f8'", "(1000000000000,)")}, "t: (Unable to allocate|EOF)"),
         ({"t": header("'<f8'", "(5000,)")}, "t: EOF"),
