@@ -64,8 +64,8 @@ def definitions(starts: int) -> dict[str, str]:
             " the table of quantities in % of V_c(0), and in the bars of the figures in % of the energy lost.",
         "holds":
             f"in the paper's cases as printed, from the same start for both cases, in at least {ALMOST_ALL:.0%} of the"
-            " random starts (statements about every motion: in all), and, along the sweep of the parameter, at most"
-            " values as stated and at none reversed.",
+            " random starts (statements about every motion: in all), and, along the sweep of the parameter, as"
+            " stated at most of its values and reversed at none.",
         "does not hold":
             f"true in less than {HALF:.0%} of the random starts, in every case that the statement is about and in"
             " every comparison.",
