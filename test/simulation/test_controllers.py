@@ -194,7 +194,7 @@ def test_what_a_controller_raises_passes_through_with_its_tick(compiled: bool) -
         (lambda *_: "much", "returned 'much' at tick 0, t = 0.0 s; allowed: a finite number of N"),
         (lambda *_: None, "returned None at tick 0"),
         (numba.njit(lambda tick, time, x, v: 1.0 if tick < 3 else None), "returned None at tick 3"),
-        (lambda *_: np.zeros(1), "returned array"), (lambda *_: np.True_, "answered np.True_"),
+        (lambda *_: np.zeros(1), "returned array"), (lambda *_: np.True_, "returned np.True_"),
         (lambda *_: -math.inf, "returned -inf"),
         (numba.njit(lambda tick, time, x, v: "much"), "float(int, float, float, float): No conversion from "),
         *((law, "too many positional arguments; allowed: a callable of tick, time, x and v")
