@@ -24,6 +24,7 @@ from grasp_ros.physics.errors import Refused, need
 from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.given import mapping, names, number, read_number, whole
 from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.simulation.chunk import Setup, check
 from grasp_ros.simulation.ensemble import ensemble
@@ -78,6 +79,10 @@ class DesignProblem:
                 raise Refused(f"outcome {name}: has several units; allowed: one of {', '.join(GROUPS[name])}")
         self.units = {name: columns[0].unit for name, columns in self._columns.items()}
         self.setup, _ = check(scene, setup, self.names)
+        absent = [f"_{NAMES[body]}" for body in scene.system.absent]
+        for name in self.names:
+            if any(body in name for body in absent):
+                raise Refused(f"outcome {name}: {scene.name} has no such body; allowed: outcomes of those it has")
         self.axes = Plan(scene, self.setup, tuple(axes), sample=1).axes
 
     def numbers(self, parts: Array) -> dict[str, Array]:
@@ -165,14 +170,14 @@ def design(
     most = mapping("subject_to", {} if subject_to is None else subject_to)
     bounds = [Bound(name, number(name, value)) for name, value in most.items()]
     problem = DesignProblem(scene, axes, [minimise], bounds, setup)
-    with showing(progress, None, "run", scene.name) as told:
-        return search(problem, seed, told)
+    with showing(progress, None, "run", scene.name) as report:
+        return search(problem, seed, report)
 
 
 def search(problem: DesignProblem, seed: int = 0, progress: Callback | None = None) -> Design:
     """Find the choice whose first outcome is smallest within the bounds.
 
-    Where the best choice is unique every seed ends there. `progress` is told the number of simulations so far. Refused:
+    Where the best choice is unique every seed ends there. `progress` gets the number of simulations so far. Refused:
     no choice was found that keeps the bounds and has the outcome, all have the same one, or scipy is not installed.
     """
     need("`grasp design`", "scipy")
@@ -272,9 +277,9 @@ def front(problem: DesignProblem, seed: int = 0, progress: Callback | None = Non
 
     def add(name: str, bounds: Sequence[Bound]) -> Design:
         before = sum(own.runs for own in choices)
-        told = None if progress is None else lambda runs: progress(before + runs)
+        report = None if progress is None else lambda runs: progress(before + runs)
         names = (name, *(other for other in problem.minimise if other != name))  # one to make small, both to look at
-        choices.append(search(DesignProblem(problem.scene, problem.axes, names, bounds, problem.setup), seed, told))
+        choices.append(search(DesignProblem(problem.scene, problem.axes, names, bounds, problem.setup), seed, report))
         return choices[-1]
 
     most, least = add(first, problem.bounds).outcomes[second], add(second, problem.bounds).outcomes[second]

@@ -135,6 +135,15 @@ def test_runs_that_are_too_short_are_named_as_the_reason() -> None:
         gr.design(scene, {BOTH_KV: (0.5, 30.0)}, "last_outside")
 
 
+@pytest.mark.parametrize(("minimise", "bounds"), [
+    ("last_outside_object", {}), ("last_outside", {"x_right_max": 1.0}),
+])
+def test_an_outcome_of_a_body_that_the_scene_does_not_have_is_refused(minimise: str, bounds: Any) -> None:
+    """All choices were tried, and the reason was a mass outside its bound at the end of every run."""
+    with pytest.raises(gr.Refused, match=r"outcome \w+: arm_alone has no such body; allowed: outcomes of those"):
+        gr.design(gr.load("arm_alone"), {"left_arm.mass_kg": (1.0, 2.0)}, minimise, bounds)
+
+
 def test_a_settling_time_that_nothing_proves_is_refused_with_the_reason() -> None:
     with pytest.raises(gr.Refused, match=r"V_c may rise: commands are held .* last_outside needs no proof"):
         gr.design(gr.load("case_01", ["loop={}"]), {BOTH_KV: (1.0, 2.0)}, "settling_time")
