@@ -28,7 +28,10 @@ from sensor_msgs.msg import JointState
 from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.verify import verify
+from grasp_ros.graph.health import watchdog
 from grasp_ros.graph.health.peers import PeerNode
+from grasp_ros.graph.nodes.controller import Controller
+from grasp_ros.graph.nodes.monitor import Monitor
 from grasp_ros.graph.nodes.plant import Plant
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.serialization import force_message
@@ -255,3 +258,28 @@ def test_a_free_run_has_a_priority_or_says_why_not(grasp_run: Any, tmp_path: Pat
     run.terminate()
     given = "real-time priority is not available here" not in run.communicate(timeout=DEADLINE)[1]
     assert found == {name: os.SCHED_RR if given and name != "monitor" else os.SCHED_OTHER for name in nodes}
+
+
+def test_a_monitor_that_waits_for_a_lost_command_is_not_blocked(
+    context: rclpy.Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its own watchdog ended it before the bag was closed."""
+    ended = list[int]()
+    watched, given = Parameter("wait_for_monitor", value=True), {"scene": "arm_alone", "free_running": True}
+    plant = Plant(context=context, parameter_overrides=[watched, *(Parameter(k, value=v) for k, v in given.items())])
+    controller = Controller("left_controller", context=context, parameter_overrides=[watched])
+    monitor = Monitor(context=context, parameter_overrides=[
+        Parameter("bag", value=str(tmp_path / "bag")), Parameter("on_silence", value="end")])
+    executor = SingleThreadedExecutor(context=context)
+    for node in (plant, controller, monitor):
+        executor.add_node(node)
+    wait_for(lambda: executor.spin_once(timeout_sec=0.1) or any(monitor._acted), "a command that acted")
+    monkeypatch.setattr(watchdog.os, "_exit", ended.append)
+    monkeypatch.setattr(monitor.heartbeats, "frozen", lambda: ["/left_controller"])
+    monkeypatch.setattr(monitor, "take_waiting", lambda *_: None)
+    for commands in monitor._commands.values():
+        commands.clear()
+    end_nodes(monitor)
+    assert not ended
+    assert len(bag.read(tmp_path / "bag").tick)
+    end_nodes(plant, controller)

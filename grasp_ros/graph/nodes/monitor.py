@@ -280,13 +280,13 @@ class Monitor(PeerNode):
 
     def _take_commands(self) -> None:
         """Record the commands that acted in a free run: it may have been behind, and DDS sends again what was lost."""
-        end = time.monotonic() + GIVE_UP_SECONDS
-        self.take_waiting(self._others, topics.DEPTH)
-        while time.monotonic() < end and any(
-            (force := self._acted[ARMS[topic]]) and force not in self._commands[topic] for topic in self._commands
-        ):
-            time.sleep(LOOK_SECONDS)
+        for _ in range(round(GIVE_UP_SECONDS / LOOK_SECONDS)):
             self.take_waiting(self._others, topics.DEPTH)
+            acted = {topic: self._acted[ARMS[topic]] for topic in self._commands}
+            if all(force in (0.0, *self._commands[topic]) for topic, force in acted.items()):
+                return
+            self._watchdog.feed()  # it waits, and is not blocked
+            time.sleep(LOOK_SECONDS)
 
     def close(self) -> None:
         """Close the bag; then let the plant have the last value."""
