@@ -62,7 +62,7 @@ class GraspNode(ParameterNode):
         self.finished = False  # whether there is nothing left to do
         self.exit_code = 0  # 1 after a failure, 2 after a refusal before it has begun
         self.counters: dict[str, int | float | str] = {}  # the values of its /diagnostics
-        # Topics that it or its readers take from one publisher; what more would do beside.
+        # Topics that have one publisher each, with what a second one would do, if that is known.
         self.inputs: dict[Topic, str] = {}
         self._complaints: dict[tuple[str, Topic], float] = {}  # when to say it again
         self.concern = ""  # what is not as it should be, although the node goes on
