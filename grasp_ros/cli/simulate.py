@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from contextlib import chdir
+import os
 from typing import Any
 
 import numpy as np
@@ -71,24 +71,26 @@ def _simulate(options: argparse.Namespace) -> int:
     for other, number in given.items():
         if other != knob and number not in (None, ACCURACY):
             raise Refused(f"--{other} is not allowed; allowed for {options.method}: --{knob}")
-    with chdir("."):  # and back: the user's module and law may leave it
-        controllers = load_controllers(options.controllers)
+    check_output(options.output, (".npz", ".csv"), options.force, [options.scene])
+    here = os.open(".", os.O_RDONLY)
+    controllers = load_controllers(options.controllers)
     sampled = options.sampled or bool(controllers)
     check_memory(scene, sampled, options.grid)
-    check_output(options.output, (".npz", ".csv"), options.force, [options.scene])
     grid = None
     if options.grid is not None:  # ticks to the bit: a rounding before one the last command still acts
         every, rest = divmod(scene.ticks, options.grid - 1)
         on_ticks = every and not rest and (sampled or scene.sampled)
         grid = tick_times(scene)[::every] if on_ticks else np.linspace(0.0, scene.duration, options.grid)
     prepare()
-    with bar(scene.duration, "s", scene.name) as progress, chdir("."):
+    with bar(scene.duration, "s", scene.name) as progress:
         trajectory = simulate(
             scene, grid=grid, sampled=sampled, controllers=controllers, method=options.method, setting=given[knob],
             max_events=options.max_events, max_work=options.max_work,
             sensitivity=options.sensitivity or None,
             progress=None if knob == STEP else progress,
         )
+    os.fchdir(here)  # a controller, or its module, may have called os.chdir
+    os.close(here)
     found = summary(trajectory)
     rows = describe_trajectory(trajectory, found)
     rates = trajectory.sensitivity

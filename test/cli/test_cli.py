@@ -50,9 +50,12 @@ def test_simulate_with_a_controller_of_a_module_here(command: Any, tmp_path: Pat
 def test_a_controller_may_leave_the_working_directory(command: Any, tmp_path: Path) -> None:
     """The output was looked for in the other directory, and replaced without --force."""
     (tmp_path / "away").mkdir()
+    (tmp_path / "away" / "force.txt").write_text("0.0")
     (tmp_path / "o.npz").write_bytes(b"of before")
     (tmp_path / "goes.py").write_text(
-        'import os\nos.chdir("away")\ndef law(tick, time, x, v):\n    os.chdir("/")\n    return 0.0\n')
+        'import os, pathlib\nos.chdir("away")\ndef law(tick, time, x, v):\n'
+        '    force = float(pathlib.Path("force.txt").read_text())\n'
+        '    if tick == 10: os.chdir("/")\n    return force\n')
     words = ("simulate", "arm_alone", "--set", "time.duration_s=0.01", "--controller", "left=goes:law", "-o", "o.npz")
     refused = command(*words)
     assert (refused.returncode, (tmp_path / "o.npz").read_bytes()) == (2, b"of before")
