@@ -123,7 +123,7 @@ def test_what_cannot_be_designed_is_refused(free: Any, minimise: str, bounds: An
 
 
 def test_a_bound_that_no_choice_keeps_is_named_where_the_outcome_is_missing_as_well() -> None:
-    """The sentence told of the outcome alone: nothing had settled within 2 s."""
+    """The message named the outcome alone: nothing had settled within 2 s."""
     scene = gr.load("case_01", ["time.duration_s=2"])
     with pytest.raises(gr.Refused, match=r"<= 0.001; the nearest has last_outside inf, peak_input 2\.5$"):
         gr.design(scene, {BOTH_KV: (1.0, 2.0)}, "last_outside", {"peak_input": 1e-3})

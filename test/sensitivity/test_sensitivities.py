@@ -285,7 +285,7 @@ def test_spectrum_of_a_damped_arm_and_of_an_elastic_grasp() -> None:
     stiff = arm.changed({"left_arm.damping_Ns_per_m": 300.0})  # which nothing is left of after half a second
     rates = np.linalg.eigvals([[0.0, 1.0], -stiff.system.closed_loop[LEFT, [Of.STIFFNESS, Of.DAMPING]]])
     assert spectrum(stiff) == pytest.approx(np.sort(rates)[::-1], abs=bound)
-    with pytest.raises(Refused, match=r"tangent vectors become nearly parallel within 0\.000153 s"):
+    with pytest.raises(Refused, match=r"nearly parallel within 0\.000153 s; allowed: slower decay, or a shorter"):
         spectrum(arm.changed({"left_arm.damping_Ns_per_m": 1e12}))
     slides = horizon("friction", 1.0).changed({
         "left_arm.damping_Ns_per_m": 300.0, "object_friction.coulomb_N": 1e-9, "object.velocity_m_per_s": 1.0})
