@@ -20,17 +20,22 @@ from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.clock import ClockType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from rclpy.serialization import deserialize_message
 from rclpy.time import Time as RosTime
 from rosbags.typesys import Stores, get_typestore
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.verify import laws_of
+from grasp_ros.graph.lockstep.synchronizer import Tick
 from grasp_ros.graph.nodes.controller import Controller
+from grasp_ros.graph.nodes.lyapunov_monitor import LyapunovMonitor
 from grasp_ros.graph.nodes.monitor import Monitor
 from grasp_ros.graph.nodes.plant import Plant
 from grasp_ros.graph.parameters import FREE, NODES
+from grasp_ros.graph.ros.messages import State
 from grasp_ros.graph.serialization import list_message
 from grasp_ros.physics.layout import LEFT
 from grasp_ros.scene.topics import CHANGES, NAMED_LIST
@@ -161,6 +166,28 @@ def test_no_number_that_was_set_is_missed_by_a_monitor_that_is_behind(context: r
     assert laws_of(recording) == {"left": "the scene's law"}
     assert not any(recording.missing.values())
     assert recording.lost["lost announcements"] == recording.lost["refused announcements"] == "0"
+
+
+def test_the_laws_of_two_resets_in_a_row_each_act_in_their_run() -> None:
+    """A free run's states need no commands: after a reset its laws may come later, and those of the next reset, too."""
+    arm = scene.load("arm_alone")
+    numbers, monitor = arm.numbers_of("left_controller"), LyapunovMonitor(arm)
+
+    def announce(gain: float) -> None:
+        monitor.announce("left", list_message(0, [*numbers], [*{**numbers, GAIN: gain}.values()]))
+
+    def acting() -> list[float]:
+        return [deserialize_message(cdr, JointState).position[[*numbers].index(GAIN)] for _, cdr in monitor.begin(0)]
+
+    announce(1.0)
+    assert acting() == [1.0]
+    monitor.evaluate([Tick(0, False, State(0, arm.initial_state.tolist(), [0.0, 0.0, 0.0]), {}, 0, 0)])
+    monitor.restart()
+    announce(2.0)
+    announce(3.0)
+    assert acting() == [2.0]
+    monitor.restart()
+    assert acting() == [3.0]
 
 
 def test_an_announcement_that_is_lost_is_seen_in_the_bag(tmp_path: Path) -> None:

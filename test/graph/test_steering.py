@@ -147,6 +147,23 @@ def test_a_monitor_that_was_behind_has_all_commands_of_a_free_run(
     assert (run.returncode, "451 states follow" in out) == (0, True), out + err
 
 
+def test_resets_in_a_row_lose_nothing_of_a_free_run(grasp_run: Any, launch: Any, tmp_path: Path) -> None:
+    """A monitor took what came after a reset for what came before: contact forces and laws were missing."""
+    run = grasp_run("case_01", "--set", "time.duration_s=0.2", "--paused", "--no-figure", "--free-running")
+    shell = launch(*GRASP, "ctl", **PIPES)
+    ask = partial(answer_of, shell)
+    wait_for(lambda: "paused at tick 0 of" in ask("status"), "the first state")
+    for number in range(1, 9):
+        assert ask("step 5").startswith("case_01: paused at tick 5")
+        assert ask("reset").startswith(f"case_01: paused at tick 0 of 200, t = 0 s, {number} resets")
+    shell.communicate("resume\n", timeout=DEADLINE)
+    out, err = run.communicate(timeout=DEADLINE)
+    assert run.returncode == 0, out + err
+    recording = bag.read(tmp_path / "run" / "bag")
+    assert not any(recording.missing.values())
+    assert recording.closed
+
+
 def test_a_bag_of_another_program_is_published_from_its_first_message_on_or_refused(
     recorded: Path, tmp_path: Path
 ) -> None:

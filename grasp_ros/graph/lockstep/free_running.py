@@ -92,8 +92,8 @@ class FreeRunning:
             yield Need(LYAPUNOV, "sign of having had a command of each side", due, first=True)
 
     def ask_again(self, now: float) -> None:
-        """Publish the first state again while it waits for an answer; then the wall clock goes on."""
-        if self._awaits:
+        """Publish a state again while it waits for an answer to it: the first one, and one that is to be reset."""
+        if self._awaits or self._steering.reset_due:
             self._plant.repeat()
 
     def start(self) -> None:
@@ -131,6 +131,8 @@ class FreeRunning:
         if math.isnan(self._anchor):
             self._set_anchor()
         if self._steering.reset_due:
+            if plant.outrun(0):  # it would take what comes after a reset for what came before: the stamps are the same
+                return
             self._held = {side: Held() for side in self._held}
             self._steering.reset_done()
             self._set_anchor()

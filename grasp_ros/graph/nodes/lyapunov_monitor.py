@@ -62,8 +62,7 @@ class LyapunovMonitor:
         self._waiting[side].append((stamp, numbers, cdr))
 
     def restart(self) -> None:
-        """Forget the last tick and what it was announced for: time went back."""
-        self._before = None
+        """Let laws act that were announced for the beginning: time went back."""
         self._acting.clear()
 
     def _is_due(self, side: str, time_ns: int) -> bool:
