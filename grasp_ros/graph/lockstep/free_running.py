@@ -136,13 +136,7 @@ class FreeRunning:
             self._held = {side: Held() for side in self._held}
             self._steering.reset_done()
             self._set_anchor()
-        if self._steering.steps:  # asked for: not with the clock; the timer calls again
-            end = time.monotonic() + BURST_SECONDS
-            while (now := time.monotonic()) < end and not (plant.finished or plant.outrun() or self._waits(now)):
-                if not self._steering.go_on():
-                    break
-                self._step()
-        if self._steering.halted or self._steering.steps:
+        if self._steering.halted:
             self._timing.pause()
             self._set_anchor()
             return
@@ -159,6 +153,8 @@ class FreeRunning:
         while not plant.finished and (now := time.monotonic()) < begin + BURST_SECONDS:
             due = self._anchor + (plant.tick + 1) * self._period
             if now < due or plant.outrun() or (now - due > self._period and self._waits(now)):
+                return
+            if not self._steering.go_on():
                 return
             if plant.at_end:
                 plant.finish()
