@@ -279,6 +279,8 @@ def test_keys_pause_and_step_a_running_plant(
             screen.press(RIGHT)
             screen.wait(f"t = {case.time_of(tick + step):.3f} s")
             assert (status()["tick"], status()["state"]) == (tick + step, "paused")
+        assert call("reset", node).success
+        screen.wait(r"t = 0\.000 s   paused")  # what belongs to the first state was taken for what came before
         screen.press(b" ")
         wait_for(lambda: status()["tick"] > tick + 10, "the run to go on")
         screen.press(RIGHT)

@@ -50,7 +50,7 @@ class Watch(GraspNode):
         self._lockstep = True
         self._seen: defaultdict[Topic, dict[int, bytes]] = defaultdict(dict)  # the last messages, by their stamps
         self._found: dict[Topic, bytes] = {}  # those of the newest state of which all have come
-        self._state, self._stale = -1, 0.0  # stamp of the last one, and until when nothing but states is taken
+        self._state, self._stale = -1, 0.0  # stamp of the last one, and until when nothing later than it is taken
         self._there, self._before, self._rate = time.monotonic(), (time.monotonic(), 0), 0.0  # a plant, at the latest
         where = place(os.environ, self.get_namespace())
         self._nobody = f"no plant has come for {PATIENCE_SECONDS:g} s {where}"
@@ -91,7 +91,7 @@ class Watch(GraspNode):
                 self._seen.clear()
                 self._stale = now + STALE_SECONDS
             self._state = stamp
-        elif now < self._stale:
+        elif now < self._stale and stamp > self._state:
             return
         seen = self._seen[topic]
         seen.pop(stamp, None)
