@@ -24,9 +24,7 @@ def error_against_time(scene: Scene, truth: Truth, records: Sequence[Record], ad
             axes.loglog([record.error for record in group], [1e3 * record.time for record in group], label=name,
                         color=colors(place % 20), marker=MARKS[place % len(MARKS)], markersize=5, linewidth=1.0)
         axes.axvspan(axes.get_xlim()[0], truth.uncertainty, color="0.9", zorder=0)
-        axes.axvline(truth.uncertainty, color="0.5", linewidth=0.8)
-        axes.annotate(" not known better\n in double precision", (truth.uncertainty, 1.0), va="top", fontsize="x-small",
-                      xycoords=("data", "axes fraction"), color="0.4")
+        axes.axvline(truth.uncertainty, color="0.5", linewidth=0.8, label="not known better\nin double precision")
         if error is not None:
             axes.axvline(error, color=CHOSEN, linewidth=0.8, linestyle="--")
         if budget is not None:

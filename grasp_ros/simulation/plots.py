@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from html import escape
 from io import BytesIO
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from grasp_ros.physics.energy import PLANT_ALONE
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import ascending, instance, names, number, rows
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
+from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import BODIES, COLUMN, NAMES
 from grasp_ros.scene.files import format_of, replacing
 from grasp_ros.simulation import canvas
@@ -112,10 +113,10 @@ def compose(
             title = "\n".join(textwrap.fill(text, letters) for text in (title, caption))
             grid[0, column].set_title(title, fontsize="medium", parse_math=False)  # a $ of a title is a $
             for panel, axes in zip(panels, grid[:, column], strict=True):
+                axes.set_xlim(*(motion.t[[0, -1]] if span is None else span))
                 panel.draw(axes, motion)
                 shade_contacts(axes, motion)
                 axes.grid(alpha=0.3)
-                axes.set_xlim(*(motion.t[[0, -1]] if span is None else span))
                 if column == 0:
                     axes.set_ylabel(panel.label)
             grid[-1, column].set_xlabel("time, s")
@@ -154,10 +155,17 @@ def legend_beside(*row: Axes) -> None:
                        fontsize="small", frameon=False)
 
 
+def plot(axes: Axes, motion: Motion, values: Array, **style: Any) -> None:
+    """Plot values (n,) over time, up to one output time beyond the limits of the time axis, so that y fits the rest."""
+    first, last = (-np.inf, np.inf) if axes.get_autoscalex_on() else axes.get_xlim()
+    rows = slice(max(np.searchsorted(motion.t, first, "right") - 1, 0), np.searchsorted(motion.t, last) + 1)
+    axes.plot(motion.t[rows], values[rows], **style)
+
+
 def displacements(axes: Axes, motion: Motion) -> None:
     """Positions, by their columns of the table, as all that follow."""
     for body in motion.scene.system.present:
-        axes.plot(motion.t, motion.state[:, COLUMN[body]], label=f"x_{NAMES[body]}", color=COLORS[body], linewidth=1.2)
+        plot(axes, motion, motion.state[:, COLUMN[body]], label=f"x_{NAMES[body]}", color=COLORS[body], linewidth=1.2)
 
 
 def driven(motion: Motion) -> list[int]:
@@ -170,24 +178,24 @@ def inputs(axes: Axes, motion: Motion) -> None:
     """Forces of controllers and from outside; what is held from tick to tick as steps."""
     forces, style = motion.inputs, "steps-post" if _sampled(motion) else "default"
     for body in driven(motion):
-        axes.plot(motion.t, forces[:, body], label=f"input_{NAMES[body]}", color=COLORS[body], linewidth=1.0,
-                  drawstyle=style)
+        plot(axes, motion, forces[:, body], label=f"input_{NAMES[body]}", color=COLORS[body], linewidth=1.0,
+             drawstyle=style)
 
 
 def impacts(axes: Axes, motion: Motion) -> None:
     """Impact forces as they act on the object: of the left contact upwards, of the right one downwards."""
     for side in motion.scene.system.contacts:
         sign, text = (1.0, "") if side == LEFT else (-1.0, "-")
-        axes.plot(motion.t, sign * motion.impacts[:, side], label=f"{text}impact_{NAMES[side]}", color=COLORS[side],
-                  linewidth=0.9)
+        plot(axes, motion, sign * motion.impacts[:, side], label=f"{text}impact_{NAMES[side]}", color=COLORS[side],
+             linewidth=0.9)
 
 
 def energies(axes: Axes, motion: Motion) -> None:
     """V_c, and the paper's V where it is another one; of the plant alone where nobody knows that of a controller."""
     level, known = motion.energy, motion.energy_of != PLANT_ALONE
-    axes.plot(motion.t, level.V_c, color="black", linewidth=1.2, label="V_c" if known else f"V_c of {PLANT_ALONE}")
+    plot(axes, motion, level.V_c, color="black", linewidth=1.2, label="V_c" if known else f"V_c of {PLANT_ALONE}")
     if known and not np.array_equal(level.V, level.V_c, equal_nan=True):
-        axes.plot(motion.t, level.V, color=V_COLOR, linewidth=1.0, linestyle="--", label="V of the paper")
+        plot(axes, motion, level.V, color=V_COLOR, linewidth=1.0, linestyle="--", label="V of the paper")
     # One scale for all motions that share the axis: logarithmic where V_c falls far and stays above 0.
     lines = [line for own in axes.get_shared_y_axes().get_siblings(axes) for line in own.get_lines()]
     levels = np.concatenate([line.get_ydata() for line in lines if str(line.get_label()).startswith("V_c")])

@@ -77,6 +77,17 @@ def test_one_scale_for_all_energies_of_a_row_and_steps_for_what_is_held() -> Non
         assert {line.get_drawstyle() for line in figure.axes[-1].lines} == {"steps-post"}
 
 
+def test_the_height_fits_what_lies_within_the_span() -> None:
+    """The end of a sampled run was once a flat line, because the axes had room for its first forces."""
+    run = simulate(scenes.load("noise"))
+    late = run.t >= 15.0
+    displacement, inputs, impacts, levels = compose([run], span=(15.0, 20.0)).axes
+    for axes, y in ((displacement, run.state[:, ::2]), (inputs, run.inputs[:, :2]), (impacts, run.impacts),
+                    (levels, run.energy.V_c)):
+        assert max(map(abs, axes.get_ylim())) < 1.3 * np.nanmax(np.abs(y[late]))
+        assert axes.get_xlim() == (15.0, 20.0)
+
+
 def test_contacts_of_a_recording_are_those_of_the_events() -> None:
     run = simulate(scenes.load("case_03"), grid=np.linspace(0.0, 20.0, 20001))
 
