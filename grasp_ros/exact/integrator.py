@@ -23,7 +23,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import number, whole
 from grasp_ros.physics.layout import Filled, Law, Of, Outcome, U, Work, X
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import System
+from grasp_ros.physics.system import A_SYSTEM, System
 
 MAX_EVENTS, MAX_WORK = 10**7, 10**8  # budgets; the second lasts for a minute or a few
 BREATH = 10**6  # units of work, less than a second, after which a kernel lets Python see a Ctrl-C
@@ -77,7 +77,7 @@ class Integrator:
     Raises
     ------
     Refused
-        If the accuracy is outside its range, a budget no whole number, or the state is not finite.
+        If the system is none, the accuracy outside its range, a budget no whole number, or the state not finite.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class Integrator:
         max_work: int = MAX_WORK,
     ) -> None:
         self._accuracy = check_accuracy(accuracy)
-        begin = np.asarray(system.state, dtype=float)
+        begin = np.asarray(given.instance("system", system, System, A_SYSTEM).state, dtype=float)
         state = begin.tolist()  # of few numbers lists are faster than arrays
         if begin.shape != (6,) or not all(map(math.isfinite, state)):
             raise Refused(f"state: {begin!r} is not an array of six finite numbers")

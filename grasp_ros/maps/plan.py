@@ -90,7 +90,7 @@ class Plan:
             object.__setattr__(self, name, value)
         names = [key for axis in self.axes for key in axis.keys]
         if not names or len(set(names)) < len(names):
-            raise Refused(f"axes: {', '.join(names) or 'none'}; allowed: one or more keys of the scene, each once")
+            raise Refused(f"parameters to vary: {', '.join(names) or 'none'}; allowed: one or more keys, each once")
         if not self.sample and len(self.axes) > MOST_AXES:
             raise Refused(f"axes: {len(self.axes)}; allowed: {MOST_AXES} of a map, any number of a sample")
         if self.rows > MOST:

@@ -16,7 +16,7 @@ from grasp_ros.physics.body_energy import body_energy
 from grasp_ros.physics.impact_law import stored_energy
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, Law, Of
 from grasp_ros.physics.model import Array, Contact, hertzian_force, in_contact, penetration
-from grasp_ros.physics.system import COLUMN, System
+from grasp_ros.physics.system import A_SYSTEM, COLUMN, System
 
 ROUNDING = 1e-12  # part of the energy that the roundings of some hundred steps may add in one control period
 
@@ -56,7 +56,7 @@ def energy(system: System, state: Array, external: Array | None = None, *, feedb
     state = given.rows("state", state, 6)
     external = None if external is None else given.rows("external", external, 3)
     given.check_rows(state=state, external=external)
-    bodies = given.instance("system", system, System, "a System").closed_loop if feedback else system.bodies
+    bodies = given.instance("system", system, System, A_SYSTEM).closed_loop if feedback else system.bodies
     kinetic: Array = np.zeros(np.shape(state)[:-1])
     potential: Array = np.zeros(np.shape(state)[:-1])
     loss: Array = np.zeros(np.shape(state)[:-1])
@@ -114,7 +114,7 @@ def energy_balance(system: System, before: Array, after: Array, forces: Array) -
     before, after = given.rows("before", before, 6), given.rows("after", after, 6)
     forces, levels = given.rows("forces", forces, 3), []
     given.check_rows(before=before, after=after, forces=forces)
-    given.instance("system", system, System, "a System")
+    given.instance("system", system, System, A_SYSTEM)
     rounding: Array = np.zeros(np.shape(before)[:-1])
     for state in (before, after):
         level: Array = np.zeros(np.shape(state)[:-1])

@@ -19,6 +19,7 @@ from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of
 from grasp_ros.physics.model import Arm, Array
 
 NO_LAW = ControlLaw()
+A_SYSTEM = "a System, such as the system of a Scene"
 BODIES = (LEFT, OBJECT, RIGHT)  # in the order of the state
 NAMES: dict[int, str] = {LEFT: "left", OBJECT: "object", RIGHT: "right"}
 Place = tuple[str, int, int]  # array of a system, row, column

@@ -33,12 +33,9 @@ from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, Topic
 from grasp_ros.scene.validation import SceneError, check_domain, check_keys, check_together, read_sections, read_texts
 
 TEXTS = ("title", "readings", "watch")
-PAPER = frozenset(  # the sections of the paper's grasp
-    ("time", "left_arm", "object", "right_arm", "left_contact", "right_contact", "left_feedback", "right_feedback")
-)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Scene(Frozen):
     """A validated scene; `load`, `parse`, `compose` and `changed` make one.
 
@@ -185,6 +182,10 @@ class Scene(Frozen):
     def to_yaml(self) -> str:
         """The whole scene as YAML; `parse` of it gives the same scene to the last bit."""
         return dump(self._document())
+
+    def __repr__(self) -> str:
+        """In a line; `to_yaml` has the numbers."""
+        return f"<Scene {self.name}: {self.title}>"
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the scene as a file has it."""

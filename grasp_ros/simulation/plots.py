@@ -88,7 +88,7 @@ def compose(
     captions = names("captions", captions if captions is not None else [
         motion.scene.feedback_in_words(_sampled(motion)) for motion in motions])
     if not 0 < len(motions) == len(captions):
-        raise Refused(f"captions: {len(captions)} for {len(motions)} motions; allowed: a motion, and one for each")
+        raise Refused(f"captions: {len(captions)} for {len(motions)} motions; allowed: motions, a caption each")
     usual = WIDTH_MM if len(motions) == 1 else 150.0 * len(motions)
     width = usual if width_mm is None else number("width_mm", width_mm)
     if width_mm is not None and not NARROWEST_MM <= width <= WIDEST_MM:

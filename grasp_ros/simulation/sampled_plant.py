@@ -17,7 +17,7 @@ from grasp_ros.physics.control import ControlLaw, normals_over
 from grasp_ros.physics.layout import Answer, Place
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.observation import Observation
-from grasp_ros.physics.system import COLUMN, System
+from grasp_ros.physics.system import A_SYSTEM, COLUMN, System
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
 
@@ -97,7 +97,7 @@ class SampledPlant:
         self.tick = 0
         self.effort: Array = np.zeros(3)
         self.inputs: Array = np.zeros(3)
-        given.instance("system", system, System, "a System")
+        given.instance("system", system, System, A_SYSTEM)
         period_ns = given.whole("period_ns", period_ns, 1)
         self._system, self._period_ns, self._period = system, period_ns, float(period_ns / NANOSECONDS)
         self._integrator = Integrator(system, continuous=False) if integrator is None else integrator

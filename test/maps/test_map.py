@@ -338,7 +338,7 @@ def test_the_command_says_why_runs_did_not_reach_their_end(tmp_path: Path, capsy
 @pytest.mark.slow
 def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for words, answer in (
-        ([], "axes: none"), (["--x", "mass"], "--x mass: not understood; allowed: section.key=low:high"),
+        ([], "parameters to vary: none"), (["--x", "mass"], "--x mass: not understood; allowed: section.key=low:high"),
         (["--x", f"{GAIN}=9:1:4"], "9.0 to 1.0 is not allowed"),
         (["--x", f"{GAIN}=-1:1:4:log"], "> 0 where logarithmic"),
         (["--x", "object.mass_kg=-1:1"], "object.mass_kg: -1.0 is not allowed; allowed: a number >= 1e-12"),

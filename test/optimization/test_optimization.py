@@ -108,7 +108,7 @@ def test_a_bound_that_no_choice_keeps_costs_the_front_one_choice(monkeypatch: py
     ({BOTH_KV: (1.0, 2.0)}, "settling_time", {"peak_input": 1e-3},
      r"none of .* with peak_input <= 0.001; the nearest has settling_time [\d.]+, peak_input 2\.5$"),
     ({"right_contact.dissipation_s_per_m": (0.1, 0.2)}, "peak_input_left", {}, r"nothing to choose: .* 1\.5 for all"),
-    ({}, "settling_time", {}, "axes: none"),
+    ({}, "settling_time", {}, "parameters to vary: none"),
     ({BOTH_KV: (2.0, 1.0)}, "settling_time", {}, "2.0 to 1.0 is not .* allowed: low < high"),
     ({BOTH_KV: ("1", 2.0)}, "settling_time", {}, "low: '1' is not allowed; allowed: a number"),
     ({BOTH_KV: 3.0}, "settling_time", {}, "3.0 is not allowed; allowed: two numbers, low and high"),

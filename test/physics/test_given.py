@@ -168,6 +168,7 @@ NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
     (lambda system: energy(system, CASE.initial_state), None, "system: NoneType"),
     (lambda state: energy(CASE.system, state), [1.0], "state: float64, shape (1,),"),
     (lambda system: SampledPlant(system, 10**6), None, "system: NoneType"),
+    (lambda system: Integrator(system, continuous=True), CASE, "system: Scene"),
     *((lambda period: SampledPlant(CASE.system, period), period, f"period_ns: {period}") for period in (0, -5, 1.5)),
     (lambda after: energy_balance(CASE.system, np.zeros((2, 6)), after, np.zeros((2, 3))), np.zeros((3, 6)),
      "shape of before (2, 6), after (3, 6), forces (2, 3)"),

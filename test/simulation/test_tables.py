@@ -54,6 +54,7 @@ def test_a_notebook_shows_a_run_and_a_scene() -> None:
     assert "<img src='data:image/png;base64," in shown
     assert "<img" not in simulate(case_of(), grid=[1.0])._repr_html_()
     assert "hertz_N_per_m1_5: 10000.0" in case_of()._repr_html_()
+    assert repr(case_of()) == f"<Scene {case_of().name}: {case_of().title}>"
     bad = gr.compose("<b>", case_of().values)
     assert "<b>" not in bad._repr_html_() + simulate(bad)._repr_html_()
 

@@ -11,6 +11,9 @@ from grasp_ros.scene.effects.base import Effect
 FILES = (time, bodies, feedback, contact, loop, sensing, saturation, friction, tilt, force)
 EFFECTS: tuple[Effect, ...] = tuple(effect for file in FILES for effect in file.EFFECTS)
 BY_SECTION = {effect.section: effect for effect in EFFECTS}
+PAPER = frozenset(  # the sections of the paper's grasp
+    ("time", "left_arm", "object", "right_arm", "left_contact", "right_contact", "left_feedback", "right_feedback")
+)
 
 
 def named(sections: Collection[str]) -> list[Effect]:
