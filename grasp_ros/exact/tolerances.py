@@ -15,11 +15,14 @@ SURFACE = 4.0  # roundings of the terms of 1 + p u', within which a pair is at u
 BEYOND = 2.0 * SURFACE  # roundings below -1/p, where a pair that was at -1/p clamps: nearer, its force only dies out
 SURFACE_DRIFT = 1024.0  # as SURFACE, after flights, which leave roundings in u'
 FRICTION = 16.0 * EPS  # of the terms of the force on an object at rest and of its friction: their rounding
-SLIDES = 0.5  # of the rounding of its force: an object that has just slipped and is accelerated by less stops at once
-SLIPS = 0.5 * SLIDES  # the same, below the friction: by more there is no slip yet; smaller, or it would stop at once
-LEFT_OUT = 0.25  # impulse of a pair that leaves without force, in units of the accuracy
-# Times the larger of the first two Taylor terms of the change of u' until u = 0. A pair whose |u'| is more does not
-# turn back; one whose u' is farther from -1/p is not clamped. The factors cover the other terms.
+# Both times the rounding of the force on the object. An object that has just slipped stops at once if the force that
+# accelerates it is below SLIDES. It does not slip yet if the force is below the friction by more than SLIPS: this is
+# smaller, so that no object slips and stops at once.
+SLIDES = 0.5
+SLIPS = 0.5 * SLIDES
+LEFT_OUT = 0.25  # times the accuracy and mu u': the impulse that a pair may neglect if it is LEAVING
+# Both times the larger of the first two Taylor terms of the change of u' until u = 0. A pair whose |u'| is above TURNS
+# does not turn back; one whose u' is farther than CLAMPS from -1/p is not clamped. The factors cover the other terms.
 TURNS, CLAMPS = 20.0, 4.0
 
 # The begin of a contact without its force.
@@ -30,10 +33,11 @@ REST = 2.0**-49  # of the scale of a scene: eight roundings, which forces that b
 SETTLED = 40.0  # time constants after which a flight may rest: e^-40 is less than a rounding
 
 # Displacements computed as such.
-SHORT_FLIGHT, FAR_SHORT = 0.25, 1.0  # of the time constants: shorter flights take the power series; the second if FAR
-FAR = 4.0  # times |x|: the rounding of a rest position beyond it would take digits of a flight that hardly moves
+# Flights shorter than SHORT_FLIGHT, or FAR_SHORT where the rest position is beyond FAR, take the power series.
+SHORT_FLIGHT, FAR_SHORT = 0.25, 1.0  # of the time constants
+FAR = 4.0  # times |x|: roundings of a rest position farther away exceed those of x
 SHORT_START = 0.2  # of the time constants, well within those of a short flight
-SHORT_WAY = 0.125  # of a penetration: a longer way has roundings like those of its end
+SHORT_WAY = 0.125  # times u at its end: a change of u that is longer has no smaller roundings than u itself
 
 # Taylor steps.
 DEFECT = 100.0  # times accuracy plus EPS: allowed defect at the end of a step, see `taylor_step.is_exact`
@@ -44,7 +48,7 @@ DECAYS = 2.0  # time constants of a damper that a step may span: terms that canc
 
 # The check of a segment.
 ENERGY = 128.0  # roundings of the sum of all terms: flights, impacts and differences of positions
-NEGLECTED = 100.0  # of it, and of a way, times the accuracy: a contact step is off by some first neglected terms
+NEGLECTED = 100.0  # times the accuracy, of an energy or a way: the error of a step is some first neglected terms
 ENERGY_UNDERFLOW = 1e-300  # J; energies of a motion that died out have few digits
 DIED_OUT = 1e-150  # m; squares and products of less have left the range of numbers
 MAX_IDLE = 1000  # segments without progress in time

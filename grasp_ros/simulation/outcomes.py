@@ -1,7 +1,7 @@
 """Outcomes of a run: numbers that say what came of it, computed from closed forms and polynomials, not from a grid.
 
-Each outcome is a column of `Outcome`; groups of columns have a name of their own. A run that stops before its end has
-no outcomes but its last state.
+Each `Outcome` is one column; a group of columns has a name of its own. A run that stops before its end has no outcomes
+but its last state.
 """
 
 from __future__ import annotations
@@ -71,8 +71,8 @@ _GROUPS: dict[str, tuple[Outcome, ...]] = {
         Outcome(f"settling_time_{name}", "s", f"the same of the {name} mass alone, where all settle", Wanted.SETTLING,
                 _settled(body)) for body, name in NAMES.items()),
     "last_outside": (Outcome(
-        "last_outside", "s", "last time within the run at which a mass is outside the bound, of every scene, and no"
-        " proof of what follows; inf: at its end", Wanted.BOUND,
+        "last_outside", "s", "last time within the run at which a mass is outside the bound; known for every scene,"
+        " but no proof of what follows; inf: outside at the end", Wanted.BOUND,
         lambda runs: np.asarray(np.fmax.reduce(runs.seen[:, Seen.LAST_OUTSIDE : SEEN], axis=1))),),
     "last_outside_times": tuple(
         Outcome(f"last_outside_{name}", "s", f"the same of the {name} mass alone", Wanted.BOUND,

@@ -67,8 +67,8 @@ def deciding_derivative(plant: Plant, state: State, side: Body) -> Deciding:
 def coming_push(plant: Plant, state: State, beside: Body) -> Deciding:
     """The first derivative of u of the other pair that a pair without a force yet moves.
 
-    If the pair closes from u = 0 with the power n of the time, its force grows with the power 3 n / 2; at u' = -1/p it
-    grows as u' + 1/p does. A derivative whose order is not whole has the value inf.
+    The force of a pair that closes from u = 0 like t^n grows like t^(3 n / 2), that of a pair at u' = -1/p like
+    u' + 1/p. It moves u of the other pair with two powers more. Where that power is not whole the value is inf.
     """
     y, mode, pair, mass = state.y, state.mode[beside], plant.pairs[beside], plant.bodies[OBJECT, Of.MASS]
     if mode not in (Pair.CONTACT, Pair.BEGINNING):

@@ -2,7 +2,7 @@
 
 A sliding object has the friction in its constant force. A stuck one gets an infinite mass: whatever pushes it moves it
 as little as a wall, in the same equations. Both are the row OBJECT of `Plant.bodies`; `Plant.given` keeps what the
-scene says. `modes.initial_slide` decides.
+scene says. This file finds when an object stops or slips; `modes.initial_slide` decides whether it then sticks.
 """
 
 from __future__ import annotations

@@ -204,8 +204,8 @@ def make_transitions(plant: Plant, state: State, ends: Ends, end: float, out: Ou
 def make_transition(plant: Plant, state: State, side: Body, kind: Transition, leaves: bool, out: Output) -> None:
     """The reset map of a pair: its next mode, u = 0 at a touch and a release, and the record of the event.
 
-    A touch with u' <= 0 by rounding is that of a pair at rest: `settle_resting` decides. A CLAMP of a pair that glides
-    at u' = -1/p, which it never passes, is rounding: the pair `leaves` without an event.
+    If rounding makes u' <= 0 at a touch, the pair is at rest, and `settle_resting` decides. If nothing moves a pair off
+    u' = -1/p, its CLAMP is due to rounding: the pair `leaves`, without an event.
     """
     y, mode, d, beside = state.y, state.mode, approach(state.y, side), other(side)
     if kind in (Transition.TOUCH, Transition.RELEASE):

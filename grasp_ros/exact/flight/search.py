@@ -1,4 +1,4 @@
-"""The first event of a pair in free flight, by steps that cannot jump over a root.
+"""The first event of a pair in free flight, such as a touch, by steps that cannot jump over a root.
 
 With |g''| <= M for all later times,
 

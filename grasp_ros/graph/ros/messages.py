@@ -1,6 +1,6 @@
-"""Messages of ROS: their types, qualities of service, and what is read of them.
+"""Messages of ROS: their types and qualities of service, and how a state is read.
 
-`graph.serialization` writes and reads those with numbers.
+The layout of messages with numbers, byte by byte, is in `graph.serialization`.
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ def qos(topic: Topic) -> QoSProfile:
 
 
 def reader_qos(topic: Topic) -> QoSProfile:
-    """That of a reader, which keeps more than a writer may.
+    """QoS of a reader, which keeps more messages than a writer.
 
-    The depth of a reader is shared by all writers of its topic: with the last messages alone, one that floods it would
-    push out those of the others. Fast DDS keeps at most 5000 otherwise, and lets the writers wait.
+    All writers of a topic share the queue of a reader. If it kept only the last messages, a writer that floods the
+    topic would push out those of the others. So it keeps all, up to the 5000 of Fast DDS, which lets the writers wait.
     """
     if topic == CLOCK:  # whose readers are ROS's own
         return glance_qos(topic)
@@ -69,13 +69,13 @@ def reader_qos(topic: Topic) -> QoSProfile:
 
 
 def glance_qos(topic: Topic) -> QoSProfile:
-    """That of a reader for which nobody waits: it may miss messages, but not one that is latched."""
+    """QoS of a reader that may miss messages, except latched ones, so that nobody waits for it."""
     return qos(topic) if topic.latched else QoSProfile(depth=topic.depth, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 def connects(writer: QoSProfile, reader: QoSProfile) -> bool:
     """Whether DDS connects them; `rclpy.qos.qos_check_compatible` takes an infinite deadline for a finite one."""
-    # Of the first two enums the smaller ones promise more; of times, those that are no longer, and 0 is for ever, too.
+    # A smaller reliability or durability promises more, and so does a shorter time; a time of 0 means forever.
     times = ((writer.deadline, reader.deadline), (writer.liveliness_lease_duration, reader.liveliness_lease_duration))
     return (writer.reliability <= reader.reliability and writer.durability <= reader.durability
             and reader.liveliness in (*AUTOMATIC, writer.liveliness)
