@@ -10,7 +10,7 @@ from documents import body, case_of, made, scene_of
 
 from grasp_ros import scene
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, Transition
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.simulation import ensemble, simulate
 from grasp_ros.simulation.contacts import UNITS
@@ -46,6 +46,20 @@ def test_impulses_are_the_change_of_momentum_and_losses_those_of_the_run(kind: s
     if not run.sampled and "method" not in how:  # otherwise `losses` are no more exact than the output times
         assert lost == pytest.approx(float(losses(run).impacts), rel=1e-10)
     assert left.dtype.names == tuple(UNITS)
+
+
+def test_contacts_are_as_their_scenes_say() -> None:
+    """`hammer` once said that the arm loses the momentum of the object, `v_jump_one_sided` that one pair is clamped."""
+    run = simulate(scene.load("hammer"))
+    hit = run.contacts("left")[0]
+    before, after = run.at([hit["begin"], hit["end"]])  # both masses are 1 kg
+    assert after[3] == pytest.approx(hit["impulse"], rel=1e-12)
+    assert before[1] - after[1] > 1.04 * hit["impulse"]
+    run = simulate(scene.load("v_jump_one_sided"))
+    clamps, reentries = ([len(run.times(kind, side)) for side in (LEFT, RIGHT)]
+                         for kind in (Transition.CLAMP, Transition.REENTRY))
+    assert clamps == [1, 1]
+    assert reentries == [0, 1]
 
 
 def test_the_peak_of_an_impact_that_is_over_long_before_its_contact_is_found() -> None:
