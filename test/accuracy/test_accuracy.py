@@ -54,7 +54,7 @@ def test_error_and_touches_are_measured_not_believed() -> None:
     assert 1e-8 < paper.error < 1e-2
     assert exact.found == exact.there_are == truth.touches
     assert exact.sound
-    assert paper.first >= paper.time > 0.0
+    assert min(paper.first, paper.time) > 0.0  # where kernels are compiled already, either may be longer
 
 
 def test_solvers_take_turns_within_the_time_and_leave_when_they_are_slow() -> None:
