@@ -36,9 +36,9 @@ def energy_level(plant: Plant, state: State, t: float) -> Level:
     """V_c - 2 sum f x at the end of a segment of t s, without dry friction, which only takes energy."""
     y, given = state.y, plant.given
     value, size = level_of(given[OBJECT], y[X.O], y[V.O], 0.0, t)
-    way = abs(y[X.O]) + t * abs(y[V.O])
-    left, size_l = level_of(given[LEFT], y[X.L], y[V.L], way, t)
-    right, size_r = level_of(given[RIGHT], y[X.R], y[V.R], way, t)
+    way, late = abs(y[X.O]) + t * abs(y[V.O]), t / ENERGY  # the time of a touch has one rounding
+    left, size_l = level_of(given[LEFT], y[X.L], y[V.L], way + late * abs(y[V.L]), t)
+    right, size_r = level_of(given[RIGHT], y[X.R], y[V.R], way + late * abs(y[V.R]), t)
     impact = 0.0
     for side in (LEFT, RIGHT):
         u = y[U.L + side]
