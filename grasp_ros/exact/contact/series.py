@@ -33,11 +33,17 @@ def convolve(f: Array, k: int, lane: int, skip: int) -> Lanes:
     """Coefficients k of eight products of series, without the terms that hold a coefficient below `skip`.
 
     f has FACTORS numbers for each order. The caller adds the terms that are left out: they hold the newest
-    coefficients, which have just been stored one by one, and reading those as a vector would wait.
+    coefficients, which have just been stored one by one, and reading those as a vector would wait. The others are added
+    in two sums, as each addition waits for the one before, and from the middle coefficients to the newest.
     """
-    total = spread(0.0)
-    for j in range(skip, max(k + 1 - skip, skip)):
-        total = add_product(total, load(f, FACTORS * j + lane), load(f, FACTORS * (k - j) + SECOND + lane))
+    low, high, half = spread(0.0), spread(0.0), (k + 1) // 2
+    for i in range(1, half + 1 - skip):
+        j = half - i
+        low = add_product(low, load(f, FACTORS * j + lane), load(f, FACTORS * (k - j) + SECOND + lane))
+        high = add_product(high, load(f, FACTORS * (k - j) + lane), load(f, FACTORS * j + SECOND + lane))
+    total = low + high
+    if k % 2 == 0 and half >= skip:
+        total = add_product(total, load(f, FACTORS * half + lane), load(f, FACTORS * half + SECOND + lane))
     return numbers_of(total)
 
 
@@ -148,8 +154,8 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
     The power of two of the unit is a part of G here: in shallow contacts products of G alone with accelerations would
     underflow.
 
-    Products: G v_o, G a_l, G a_r, G a_o, w_l w_r in both orders, so that a mirrored grasp has mirrored roundings,
-    w_r u_l', w_l u_r'; then for each side w w, u u, w^4 w of the other side, H g (1 + p u').
+    Products: G v_o, G a_l, G a_r, G a_o, w_l w_r, w_r u_l', w_l u_r'; then for each side w w, u u, w^4 w of the other
+    side, H g (1 + p u'). The sum of w_l w_r has the same roundings in a mirrored grasp.
     """
     hertz_l, loss_l = pairs[LEFT, Law.HERTZIAN], pairs[LEFT, Law.DISSIPATION]
     hertz_r, loss_r = pairs[RIGHT, Law.HERTZIAN], pairs[RIGHT, Law.DISSIPATION]
@@ -161,29 +167,29 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
     b = (w_l * s_r, s_l, s_r, hertz_l * ((w_l * w_l) * (w_l * w_l) * s_r),
          hertz_r * ((w_r * w_r) * (w_r * w_r) * s_l))
     w_end_l, w_end_r, u_end_l, u_end_r = w_l, w_r, w_l * w_l, w_r * w_r
-    a = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    a = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(np.uint64(n)):
-        gv, gl, gr, go, ww, ww_mirrored, wd_l, wd_r = convolve(f, k, FIRST, ONE)
+        gv, gl, gr, go, wd_l, wd_r, ww, _ = convolve(f, k, FIRST, ONE)
         u_l, u_r, q_l, q_r, g_l, g_r, z_l, z_r = convolve(f, k, UPPER, ONE)
         u_l, u_r = fma(w_end_l, w_l, u_l), fma(w_end_r, w_r, u_r)
         q_l, q_r = fma(u_end_l, u_l, q_l), fma(u_end_r, u_r, q_r)
-        g_l, g_r = hertz_l * fma(q_l, b[2], fma(a[8], s_r, g_l)), hertz_r * fma(q_r, b[1], fma(a[9], s_l, g_r))
-        g = 0.5 * (fma(w_l, b[2], fma(a[4], s_r, ww)) + fma(w_r, b[1], fma(a[5], s_l, ww_mirrored)))
+        g_l, g_r = hertz_l * fma(q_l, b[2], fma(a[7], s_r, g_l)), hertz_r * fma(q_r, b[1], fma(a[8], s_l, g_r))
+        g = ww + (w_l * b[2] + a[6] * s_r)
         one = 1.0 if k == 0 else 0.0
         a_l, a_o, a_r = accelerations((left, middle, right), one, x_o, (u_l, u_r), (v_l, v_o, v_r))
         d_l, d_r = v_l - v_o, v_o - v_r
         e_l, e_r = fma(loss_l, d_l, one), fma(loss_r, d_r, one)
         # The impact law (6) per 2 ds, of each side: H w^4 (1 + p u') times the other side's w.
-        z_l, z_r = fma(e_l, b[3], fma(a[10], g_l, z_l)), fma(e_r, b[4], fma(a[11], g_r, z_r))
-        wd_l, wd_r = fma(d_l, b[2], fma(a[6], s_r, wd_l)), fma(d_r, b[1], fma(a[7], s_l, wd_r))
+        z_l, z_r = fma(e_l, b[3], fma(a[9], g_l, z_l)), fma(e_r, b[4], fma(a[10], g_r, z_r))
+        wd_l, wd_r = fma(d_l, b[2], fma(a[4], s_r, wd_l)), fma(d_r, b[1], fma(a[5], s_l, wd_r))
         gv, gl = fma(v_o, b[0], fma(a[0], g, gv)), fma(a_l, b[0], fma(a[1], g, gl))
         gr, go = fma(a_r, b[0], fma(a[2], g, gr)), fma(a_o, b[0], fma(a[3], g, go))
-        store_eight(f, FACTORS * k, (v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r))
+        store_eight(f, FACTORS * k, (v_o, a_l, a_r, a_o, d_l, d_r, w_l, 0.0))
         store_eight(f, FACTORS * k + 8, (w_l, w_r, u_l, u_r, q_l, q_r, e_l, e_r))
-        store_eight(f, FACTORS * k + SECOND, (g, g, g, g, s_r, s_l, s_r, s_l))
+        store_eight(f, FACTORS * k + SECOND, (g, g, g, g, s_r, s_l, s_r, 0.0))
         store_eight(f, FACTORS * k + SECOND + 8, (w_l, w_r, u_l, u_r, s_r, s_l, g_l, g_r))
         if k == 0:
-            a = (v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r, q_l, q_r, e_l, e_r)
+            a = (v_o, a_l, a_r, a_o, d_l, d_r, w_l, q_l, q_r, e_l, e_r)
             w_end_l, w_end_r, u_end_l, u_end_r = 2.0 * w_l, 2.0 * w_r, 2.0 * u_l, 2.0 * u_r
         step = unit / (k + 1)
         twice = 2.0 * step
