@@ -13,8 +13,11 @@ import numpy as np
 from grasp_ros.cli.arguments import add_command, add_file, add_settings
 from grasp_ros.cli.checks import check_memory, check_output, load_scene, prepare, warn
 from grasp_ros.cli.output import STDOUT, figure_endings, note, write_figure
+from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import Entry
+from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.files import YAML, reading
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, plots, simulate
@@ -26,6 +29,7 @@ if TYPE_CHECKING:
     from grasp_ros.simulation.differentiate import Sensitivity
 
 Span = tuple[float, float] | None
+PER_CONTACT, MOST_EVENTS = 32, 2000  # output times between two events; with more of these a curve is a band
 WIDE = 100.0  # a derivative that grows by more has a logarithmic axis
 
 
@@ -113,8 +117,18 @@ def _motion(source: str, options: argparse.Namespace, span: Span) -> Motion:
     if span is not None and not (options.sampled or scene.sampled):
         first, last = np.clip(sorted(span), 0.0, scene.duration).tolist()
         grid = np.linspace(first, last, GRID_POINTS)
-    return simulate(scene, grid=grid, sampled=options.sampled, method=options.method, setting=options.step,
-                    sensitivity=options.sensitivity or None)
+    run = partial(simulate, scene, sampled=options.sampled, method=options.method, setting=options.step,
+                  sensitivity=options.sensitivity or None)
+    found = run(grid=grid)
+    fine = options.method == EXACT and not options.animate and found.status is Status.DONE
+    return run(grid=with_contacts(found)) if fine and 0 < len(found.event_table) <= MOST_EVENTS else found
+
+
+def with_contacts(run: Trajectory) -> Array:
+    """Output times of a run, and some more between its events: curves of short impacts reach their peaks."""
+    first, last = run.t[[0, -1]]
+    ends = np.unique(np.clip([first, *run.event_table[:, Entry.TIME], last], first, last))
+    return np.union1d(run.t, np.linspace(ends[:-1], ends[1:], PER_CONTACT, endpoint=False))
 
 
 def _beside(source: str, ending: str) -> Path:
