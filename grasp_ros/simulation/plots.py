@@ -13,6 +13,7 @@ from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
+from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.energy import PLANT_ALONE
 from grasp_ros.physics.errors import Refused
@@ -85,8 +86,7 @@ def compose(
     for motion in motions:
         if not len(instance("motion", motion, Tabular, A_MOTION).t) or motion.t[0] == motion.t[-1]:
             raise Refused("nothing to draw: the motion has fewer than two output times")
-    captions = names("captions", captions if captions is not None else [
-        motion.scene.feedback_in_words(_sampled(motion)) for motion in motions])
+    captions = names("captions", [*map(_caption, motions)] if captions is None else captions)
     if not 0 < len(motions) == len(captions):
         raise Refused(f"captions: {len(captions)} for {len(motions)} motions; allowed: motions, a caption each")
     usual = WIDTH_MM if len(motions) == 1 else 150.0 * len(motions)
@@ -130,6 +130,12 @@ def compose(
 def _sampled(motion: Motion) -> bool:
     """Whether commands are held, as in every recording."""
     return getattr(motion, "sampled", True)
+
+
+def _caption(motion: Motion) -> str:
+    """How the arms are controlled and, of a run that stopped, why it did."""
+    words, status = motion.scene.feedback_in_words(_sampled(motion)), getattr(motion, "status", Status.DONE)
+    return words if status is Status.DONE else f"{words}; {status.value}"
 
 
 def end_of(motion: Motion) -> float:

@@ -88,6 +88,12 @@ def test_the_height_fits_what_lies_within_the_span() -> None:
         assert axes.get_xlim() == (15.0, 20.0)
 
 
+def test_the_title_says_that_a_run_stopped() -> None:
+    whole, cut = (compose([simulate(scenes.load("case_01"), max_events=most)]) for most in (10**4, 3))
+    titles = [figure.axes[0].get_title() for figure in (whole, cut)]
+    assert ["stopped: the event budget" in " ".join(title.split()) for title in titles] == [False, True]
+
+
 def test_contacts_of_a_recording_are_those_of_the_events() -> None:
     run = simulate(scenes.load("case_03"), grid=np.linspace(0.0, 20.0, 20001))
 
