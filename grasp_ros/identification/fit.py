@@ -83,15 +83,16 @@ def _result(problem: FitProblem, against: Mapping[str, float]) -> Fit:
     states[:, [place for place in range(6) if place not in data.channels]] = np.nan
     covariance, reach, unseen = identifiability_of(slopes, values, len(y))
     below, above = _reaches(problem, reach, covariance, values)
-    lost = np.isinf(below) & np.isinf(above)
-    covariance[lost], covariance[:, lost] = np.nan, np.nan
-    unseen += [[place] for place in np.flatnonzero(lost).tolist() if not any(place in places for places in unseen)]
     estimates = problem.values(y)
     found = np.array([*estimates.values()])
     scale, least = np.array([(number.width, number.least) for number in problem.numbers]).T
+    low, high = np.maximum(found - scale * below, least), found + scale * above
+    lost = (low == least) & np.isinf(high)  # nothing is excluded
+    covariance[lost], covariance[:, lost] = np.nan, np.nan
+    unseen += [[place] for place in np.flatnonzero(lost).tolist() if not any(place in places for places in unseen)]
     return Fit(
-        problem.scene_at(y), data.name, data.acting, tuple(estimates), found,
-        np.maximum(found - scale * below, least), found + scale * above, covariance * np.outer(scale, scale),
+        problem.scene_at(y), data.name, data.acting, tuple(estimates), found, low, high,
+        covariance * np.outer(scale, scale),
         tuple(tuple(problem.numbers[place].key for place in places) for places in unseen),
         data.t, data.state, states, np.where(np.isin(range(6), data.channels), problem.noise, np.nan),
         residual_table(values.reshape(rows, -1), data.t, touches), missed(data, problem.noise),

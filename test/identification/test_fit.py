@@ -28,6 +28,16 @@ CONTACTS = {H_LEFT: 1e4, H_RIGHT: 1e4, P_LEFT: 0.1, P_RIGHT: 0.1}
 NOISE = 1e-4  # m
 SCENE = load("case_01").changed({"time.duration_s": 1.0, "time.control_period_s": 0.002})
 
+FRICTION = "object_friction.coulomb_N"
+STICKING = compose("sticking", {  # the object sticks, as from some 2.8 N of friction on: nothing tells 8 N from more
+    "time": {"duration_s": 2.0, "control_period_s": 0.005},
+    "left_arm": {"mass_kg": 1.0, "stiffness_N_per_m": 10.0, "damping_Ns_per_m": 0.5, "position_m": -0.05,
+                 "velocity_m_per_s": 0.0},
+    "object": {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0}, "object_friction": {"coulomb_N": 8.0},
+    "left_contact": {"hertz_N_per_m1_5": 1e3, "dissipation_s_per_m": 0.2},
+    "left_feedback": {"position_gain_N_per_m": 20.0, "velocity_gain_Ns_per_m": 2.0, "set_point_m": 0.02},
+})
+
 
 @pytest.fixture(scope="module")
 def held() -> Trajectory:
@@ -35,9 +45,9 @@ def held() -> Trajectory:
     return simulate(SCENE, sampled=True)
 
 
-def noisy(run: Trajectory, seed: int) -> Trajectory:
+def noisy(run: Trajectory, seed: int, noise: float = NOISE) -> Trajectory:
     """Positions with noise, and no velocities."""
-    state = run.state + NOISE * np.random.default_rng(seed).normal(size=run.state.shape)
+    state = run.state + noise * np.random.default_rng(seed).normal(size=run.state.shape)
     state[:, 1::2] = np.nan
     return replace(run, state=state)
 
@@ -83,24 +93,22 @@ def test_intervals_hold_a_truth_that_is_zero_or_hardly_more(p: float) -> None:
 
 @pytest.mark.slow
 def test_an_interval_has_no_end_where_the_data_show_only_a_bound() -> None:
-    """Above some 2.8 N of dry friction the object sticks, and nothing tells more of it from 8 N."""
-    friction = "object_friction.coulomb_N"
-    scene = compose("held", {
-        "time": {"duration_s": 2.0, "control_period_s": 0.005},
-        "left_arm": {"mass_kg": 1.0, "stiffness_N_per_m": 10.0, "damping_Ns_per_m": 0.5, "position_m": -0.05,
-                     "velocity_m_per_s": 0.0},
-        "object": {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0}, "object_friction": {"coulomb_N": 8.0},
-        "left_contact": {"hertz_N_per_m1_5": 1e3, "dissipation_s_per_m": 0.2},
-        "left_feedback": {"position_gain_N_per_m": 20.0, "velocity_gain_Ns_per_m": 2.0, "set_point_m": 0.02},
-    })
-    run, bounds = simulate(scene, sampled=True), 0
+    run, bounds = simulate(STICKING, sampled=True), 0
     assert np.ptp(run.state[:, 2]) == 0.0
     for seed in range(20):
-        found = fit(noisy(run, seed), [friction], scene.changed({friction: 2.0}))
+        found = fit(noisy(run, seed), [FRICTION], STICKING.changed({FRICTION: 2.0}))
         if not found.not_identifiable:
             bounds += 1
             assert 2.7 < found.low[0] < found.estimates[0] < found.high[0] == np.inf
     assert bounds > 5
+
+
+@pytest.mark.parametrize("seed", [5, 7, 11])
+def test_a_number_that_the_data_do_not_bound_at_all_is_not_identifiable(seed: int) -> None:
+    """With so much noise an object that slides looks like one that sticks."""
+    found = fit(noisy(simulate(STICKING, sampled=True), seed, noise=0.3), [FRICTION], STICKING.changed({FRICTION: 2.0}))
+    assert (found.low[0], found.high[0]) == (0.0, np.inf)
+    assert found.not_identifiable == ((FRICTION,),)
 
 
 def test_data_without_noise_give_the_numbers_back(held: Trajectory, tmp_path: Path, command: Any) -> None:
