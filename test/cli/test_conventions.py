@@ -146,6 +146,15 @@ def test_a_closed_output_is_no_traceback(program: str) -> None:
     assert "Exception" not in result.stderr
 
 
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_file_is_written_although_nobody_reads_the_table(tmp_path: Path, unbuffered: str) -> None:
+    path = tmp_path / "run.npz"
+    result = shell(f"$GRASP simulate case_01 --set time.duration_s=1 -o {path} | true; exit ${{PIPESTATUS[0]}}",
+                   PYTHONUNBUFFERED=unbuffered)
+    assert (result.returncode, result.stderr) == (0, f"written to {path}\n")
+    assert path.exists()
+
+
 def test_a_table_into_a_closed_output_is_not_lost_in_silence() -> None:
     found = shell("$GRASP new - >&-")
     assert (found.returncode, found.stderr) == (2, "grasp: -o -: the standard output is closed\n")
