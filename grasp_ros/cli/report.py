@@ -44,7 +44,7 @@ def describe_trajectory(trajectory: Trajectory, found: dict[str, Any]) -> list[R
     if method.events:
         clamps, sticks = sum(found["clamped"].values()), found["sticks"]  # which are rare
         touches = ", ".join(map(str, found["touches"].values()))
-        touches += (f"; {clamps} times u' < -1/p" if clamps else "") + (f"; {sticks} times stuck" if sticks else "")
+        touches += (f"; u' < -1/p: {clamps}" if clamps else "") + (f"; stuck: {sticks}" if sticks else "")
     rows = [
         ("scene", found["title"]), ("feedback", found["feedback"]),
         *((f"{side} controller", name) for side, name in own.items()),

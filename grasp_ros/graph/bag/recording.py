@@ -161,7 +161,7 @@ class Recording(Tabular, Frozen):
         """
         acted = acted_from(self.tick, self.effort)
         if not self.whole or len(self.tick) < 2 or not np.isfinite(acted[:-1]).all():
-            why = f"{self.resets} resets" if self.resets else "a tick or a force is missing"
+            why = f"resets: {self.resets}" if self.resets else "a tick or a force is missing"
             raise Refused(f"{self.path}: {why}; allowed: a bag of one run from its begin, with two ticks or more")
         wait = self.scene.system.delay
         forces = np.vstack([acted[wait:-1], np.zeros((1 + wait, 2))]).T.tolist()  # from the last tick on nothing acts
