@@ -68,6 +68,15 @@ def losses(plant: Plant, before: Level, modes: tuple[int, int], size: float, t: 
     return loss
 
 
+@kernel
+def set_back(plant: Plant, y: Array, side: Body, mode: int, u: float) -> float:
+    """Energy in J of V by which an arm changes that roundings left in the object by u: its touch moves it to u = 0."""
+    if mode != Pair.OPEN or u <= 0.0:
+        return 0.0
+    arm = plant.given[side]
+    return 2.0 * (arm[Of.STIFFNESS] * abs(arm_of(y, side)[0]) + abs(arm[Of.FORCE])) * u
+
+
 @inlined
 def penetrates(plant: Plant, state: State, side: Body, before: float, size: float, t: float, part: float) -> bool:
     """Whether an open pair has u > 0 by more than rounding and `part` of its travel in t s: a touch has been missed.
@@ -103,7 +112,8 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
     if (penetrates(plant, state, LEFT, before.u_l, size, t, part)
             or penetrates(plant, state, RIGHT, before.u_r, size, t, part)):
         return Outcome.PENETRATES
-    rounding = part * size + ENERGY_UNDERFLOW
+    rounding = part * size + ENERGY_UNDERFLOW + (
+        set_back(plant, y, LEFT, modes[0], before.u_l) + set_back(plant, y, RIGHT, modes[1], before.u_r))
     driven = plant.given[LEFT, Of.DAMPING] < 0.0 or plant.given[RIGHT, Of.DAMPING] < 0.0
     if driven or not abs(rise) > rounding:  # nan where energies overflow before the state does
         return Outcome.GO_ON
