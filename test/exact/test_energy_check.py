@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from documents import body, made
 from exact.bench import bench
 
 from grasp_ros import scene
@@ -164,6 +165,49 @@ def test_an_arm_at_zero_has_the_roundings_of_the_object_that_it_touches(side: Bo
         came = 1e12 * (roundings * EPS * depth) ** 2
         begin = after._replace(value=after.value - came)
         assert check_segment(b.plant, b.state, b.settings, begin, after, 0.01, 0, modes) == expected
+
+
+@SIDES
+def test_an_arm_that_has_swung_a_million_times_touches_two_roundings_of_time_late(side: Body) -> None:
+    """Its spring has what it moves meanwhile, and no more; the speed that is believed of it does not grow with that."""
+    x, v, t, stiffness = 0.8, 600.0, 1e6 / 1e3, 1e6
+    b = bench(side, 0.0, 0.0, stiffness=stiffness)
+    b.state.y[[COLUMN[side], COLUMN[side] + 1]], b.state.y[X.O] = (x, v), x
+    after = energy_level(b.plant, b.state, t)
+    for roundings, expected in ((1.9, Outcome.GO_ON), (2.2, Outcome.ENERGY_RISES)):
+        begin = after._replace(value=after.value - 2.0 * stiffness * x * v * t * EPS * roundings)
+        assert check_segment(b.plant, b.state, b.settings, begin, after, t, 0, OPEN) == expected
+    assert after.size < 3.0 * after.value
+
+
+@SIDES
+def test_a_touch_takes_an_arm_out_of_the_object_that_roundings_left_in_it(side: Body) -> None:
+    x, u, stiffness = 0.8, 1e-9, 1e6
+    b = bench(side, 0.0, 0.0, stiffness=stiffness)
+    b.state.y[COLUMN[side]], b.state.y[X.O] = x, x
+    after = energy_level(b.plant, b.state, 0.01)
+    for mode, depth, expected in ((Pair.OPEN, 0.9 * u, Outcome.GO_ON), (Pair.OPEN, 1.1 * u, Outcome.ENERGY_RISES),
+                                  (Pair.CONTACT, 0.9 * u, Outcome.ENERGY_RISES)):
+        begin = Level(after.value - 2.0 * stiffness * x * depth, after.size, u, u)
+        assert check_segment(b.plant, b.state, b.settings, begin, after, 0.01, 0, (mode, mode)) == expected
+
+
+@SIDES
+def test_touches_behind_ten_million_swings_of_an_arm_raise_no_alarm(side: Body) -> None:
+    """A slow object comes into its reach: of 12 runs one stopped, because the energy had risen."""
+    (sign, name), (speed, seconds) = ((-1.0, "left") if side == LEFT else (1.0, "right")), (1e-4, 1e4)
+    for x in np.linspace(1.0, 1.02, 12).tolist():
+        run = simulate(made(1.2 * seconds, 1.0, **{
+            f"{name}_arm": body(x=sign, stiffness_N_per_m=1e6, damping_Ns_per_m=0.0),
+            f"{name}_contact": {"hertz_N_per_m1_5": 1e6, "dissipation_s_per_m": 0.0},
+            "object": body(x=-sign * (x + speed * seconds), v=sign * speed)}), grid=[0.0], max_events=6)
+        assert run.status is Status.EVENT_BUDGET
+    run = simulate(made(3234.0, 1.0, **{  # whose touch is farther off than one rounding of its time
+        f"{name}_arm": body(x=sign, stiffness_N_per_m=656532184.2025075, damping_Ns_per_m=0.0),
+        f"{name}_contact": {"hertz_N_per_m1_5": 97397932.4743645, "dissipation_s_per_m": 0.0},
+        "object": body(0.24853643640478007, -sign * 1.7554618657443566, sign * 0.0002706277314684382),
+        }), grid=[0.0], max_events=6, setting=1.3084066102919687e-16)
+    assert run.status is Status.EVENT_BUDGET
 
 
 @SIDES

@@ -36,9 +36,9 @@ def energy_level(plant: Plant, state: State, t: float) -> Level:
     """V_c - 2 sum f x at the end of a segment of t s, without dry friction, which only takes energy."""
     y, given = state.y, plant.given
     value, size = level_of(given[OBJECT], y[X.O], y[V.O], 0.0, t)
-    way, late = abs(y[X.O]) + t * abs(y[V.O]), t / ENERGY  # the time of a touch has one rounding
-    left, size_l = level_of(given[LEFT], y[X.L], y[V.L], way + late * abs(y[V.L]), t)
-    right, size_r = level_of(given[RIGHT], y[X.R], y[V.R], way + late * abs(y[V.R]), t)
+    way = abs(y[X.O]) + t * abs(y[V.O])
+    left, size_l = level_of(given[LEFT], y[X.L], y[V.L], way, t)
+    right, size_r = level_of(given[RIGHT], y[X.R], y[V.R], way, t)
     impact = 0.0
     for side in (LEFT, RIGHT):
         u = y[U.L + side]
@@ -69,12 +69,18 @@ def losses(plant: Plant, before: Level, modes: tuple[int, int], size: float, t: 
 
 
 @kernel
-def set_back(plant: Plant, y: Array, side: Body, mode: int, u: float) -> float:
-    """Energy in J of V by which an arm changes that roundings left in the object by u: its touch moves it to u = 0."""
-    if mode != Pair.OPEN or u <= 0.0:
+def set_back(plant: Plant, y: Array, side: Body, mode: int, u: float, t: float) -> float:
+    """Energy in J of V by which an arm may change in a touch, which moves it to u = 0.
+
+    Roundings may have left the object in it by `u`, and the search for the time of a touch ends two roundings of t s
+    before or after it: behind many swings that is more than the roundings of the energy. It is no part of their `size`,
+    from which the fastest speed and the losses follow.
+    """
+    if mode != Pair.OPEN:
         return 0.0
-    arm = plant.given[side]
-    return 2.0 * (arm[Of.STIFFNESS] * abs(arm_of(y, side)[0]) + abs(arm[Of.FORCE])) * u
+    x, v, _ = arm_of(y, side)
+    way, arm = max(u, 0.0) + 2.0 * EPS * t * abs(v), plant.given[side]
+    return 2.0 * way * (arm[Of.STIFFNESS] * (abs(x) + way) + abs(arm[Of.FORCE]))
 
 
 @inlined
@@ -113,7 +119,7 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
             or penetrates(plant, state, RIGHT, before.u_r, size, t, part)):
         return Outcome.PENETRATES
     rounding = part * size + ENERGY_UNDERFLOW + (
-        set_back(plant, y, LEFT, modes[0], before.u_l) + set_back(plant, y, RIGHT, modes[1], before.u_r))
+        set_back(plant, y, LEFT, modes[0], before.u_l, t) + set_back(plant, y, RIGHT, modes[1], before.u_r, t))
     driven = plant.given[LEFT, Of.DAMPING] < 0.0 or plant.given[RIGHT, Of.DAMPING] < 0.0
     if driven or not abs(rise) > rounding:  # nan where energies overflow before the state does
         return Outcome.GO_ON
