@@ -169,12 +169,16 @@ def test_no_number_that_was_set_is_missed_by_a_monitor_that_is_behind(context: r
 
 
 def test_the_laws_of_two_resets_in_a_row_each_act_in_their_run() -> None:
-    """A free run's states need no commands: after a reset its laws may come later, and those of the next reset, too."""
+    """A free run's states need no commands: after a reset its laws may come later, and those of the next reset, too.
+
+    So may a law of the last tick before a reset: it never acts, and none behind it may wait for it.
+    """
     arm = scene.load("arm_alone")
     numbers, monitor = arm.numbers_of("left_controller"), LyapunovMonitor(arm)
 
-    def announce(gain: float) -> None:
-        monitor.announce("left", list_message(0, [*numbers], [*{**numbers, GAIN: gain}.values()]))
+    def announce(gain: float, tick: int = 0) -> None:
+        stamp = tick * arm.period_ns
+        monitor.announce("left", list_message(stamp, [*numbers], [*{**numbers, GAIN: gain}.values()]))
 
     def acting() -> list[float]:
         return [deserialize_message(cdr, JointState).position[[*numbers].index(GAIN)] for _, cdr in monitor.begin(0)]
@@ -188,6 +192,10 @@ def test_the_laws_of_two_resets_in_a_row_each_act_in_their_run() -> None:
     assert acting() == [2.0]
     monitor.restart()
     assert acting() == [3.0]
+    announce(4.0, tick=5)
+    monitor.restart()
+    announce(5.0)
+    assert acting() == [5.0]
 
 
 def test_an_announcement_that_is_lost_is_seen_in_the_bag(tmp_path: Path) -> None:

@@ -64,6 +64,9 @@ class LyapunovMonitor:
     def restart(self) -> None:
         """Let laws act that were announced for the beginning: time went back."""
         self._acting.clear()
+        for waiting in self._waiting.values():
+            while waiting and waiting[0][0] > 0:  # it came after the last tick of the run before
+                waiting.popleft()
 
     def _is_due(self, side: str, time_ns: int) -> bool:
         waiting = self._waiting[side]
