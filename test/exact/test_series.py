@@ -154,6 +154,21 @@ def test_coefficients_against_picard_iteration(name: str) -> None:
     assert any(abs(series[n]) > 0 for series in expected.values())
 
 
+def test_a_mirrored_grasp_has_mirrored_coefficients() -> None:
+    """To the last bit, also those of w_l w_r, which is one product."""
+    n, swap = 20, [RIGHT, LEFT, 2]
+    table, tables = expand("both", n), new_workspace(n).tables
+    bodies = BODIES[swap] * [1.0, 1.0, 1.0, -1.0]
+    x_o, v_l, v_o, v_r, u_l, u_r = START["both"]
+    tables.f[:] = np.nan
+    tables.c[list(ROWS)] = -x_o, -v_r, -v_o, -v_l, math.sqrt(u_r), math.sqrt(u_l)
+    expand_step(tables, Plant(bodies, bodies, PAIRS[swap[:2]], 0.0), step_of("both", n, 1.0))
+    image = tables.c[: LANES * (n + 1)].reshape(n + 1, LANES)
+    for lane, other, sign in ((Lane.TIME, Lane.TIME, 1.0), (X.O, X.O, -1.0), (V.O, V.O, -1.0), (V.L, V.R, -1.0),
+                              (V.R, V.L, -1.0), (Z.L, Z.R, 1.0), (Z.R, Z.L, 1.0)):
+        assert (image[:, lane] == sign * table[:, other]).all()
+
+
 def motion(name: str) -> tuple[Plant, State]:
     """The plant of a start, and where it stands."""
     x_o, v_l, v_o, v_r, u_l, u_r = START[name]
