@@ -137,7 +137,7 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
         ("size", f"{found['size_bytes'] / 1e6:.3g} MB"),
         ("scene", found["title"]),
         ("feedback", found["feedback"]),
-        ("run", recording.running.words + (f", {resets} resets" if resets else "")),
+        ("run", recording.running.words + (f", resets: {resets}" if resets else "")),
         *_timing(found),
         ("recorded", recorded_span(recording)),
         ("messages", "; ".join(f"{count}{f' at {rate:.4g} Hz' if rate else ''}: {', '.join(names)}"

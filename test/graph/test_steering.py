@@ -127,7 +127,7 @@ def test_a_plant_that_was_stepped_to_the_end_is_put_back_or_let_finish(
     begin = time.monotonic()
     assert ask("step 4000").startswith("arm_alone: paused at tick 4000 of 4000")
     assert time.monotonic() - begin > seconds
-    assert ask("reset").startswith("arm_alone: paused at tick 0 of 4000, t = 0 s, 1 resets")
+    assert ask("reset").startswith("arm_alone: paused at tick 0 of 4000, t = 0 s, resets: 1")
     assert ask("step 4000").startswith("arm_alone: paused at tick 4000 of 4000")
     shell.communicate("resume\n", timeout=DEADLINE)
     out, err = run.communicate(timeout=DEADLINE)
@@ -160,7 +160,7 @@ def test_resets_in_a_row_lose_nothing_of_a_free_run(grasp_run: Any, launch: Any,
     wait_for(lambda: "paused at tick 0 of" in ask("status"), "the first state")
     for number in range(1, 9):
         assert ask("step 5").startswith("case_01: paused at tick 5")
-        assert ask("reset").startswith(f"case_01: paused at tick 0 of 200, t = 0 s, {number} resets")
+        assert ask("reset").startswith(f"case_01: paused at tick 0 of 200, t = 0 s, resets: {number}")
     shell.communicate("resume\n", timeout=DEADLINE)
     out, err = run.communicate(timeout=DEADLINE)
     assert run.returncode == 0, out + err

@@ -223,7 +223,7 @@ def _line(status: dict[str, Any]) -> str:
     if status["state"] == Phase.WAITING.value:
         return f"{status['scene']}: {status['words']}"
     return (f"{status['scene']}: {status['state']} at tick {status['tick']} of {status['ticks']},"
-            f" t = {status['time_s']:g} s, {status['resets']} resets")
+            f" t = {status['time_s']:g} s, resets: {status['resets']}")
 
 
 def _plain(value: Any) -> Any:
