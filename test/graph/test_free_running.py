@@ -23,6 +23,7 @@ from mcap_ros2.decoder import DecoderFactory
 from processes import DEADLINE, GRASP, children, end_nodes, growing, node_command, ran, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from grasp_ros import scene
@@ -116,6 +117,27 @@ def test_a_free_run_begins_when_its_monitor_has_heard_all_controllers(context: r
         assert any(need.due == plant.published_at for need in plant.needs()) is waits  # not for ever
     executor.shutdown()
     end_nodes(plant, peer)
+
+
+def test_a_reset_waits_for_the_monitor_and_the_wait_is_no_period(context: rclpy.Context) -> None:
+    given = {"scene": "arm_alone", "free_running": True, "wait_for_controllers": False, "wait_for_monitor": True}
+    plant = Plant(context=context, parameter_overrides=[Parameter(name, value=own) for name, own in given.items()])
+    plant.begun, loop = True, plant.loop
+
+    def go_on(tick: int) -> None:
+        wait_for(lambda: loop.advance() or plant.tick >= tick, f"tick {tick}")
+
+    go_on(5)
+    tick, loop._steering.reset_due = plant.tick, True
+    time.sleep(0.3)
+    loop.advance()
+    assert (plant.tick, plant.resets) == (tick, 0)
+    record = plain_messages.lyapunov(tick * plant.scene.period_ns, [0.0] * len(LYAPUNOV_NAMES))
+    plant._on_lyapunov(serialize_message(record))
+    assert (plant.tick, plant.resets) == (0, 1)
+    go_on(5)
+    assert max(loop._timing._intervals) < 0.2
+    end_nodes(plant)
 
 
 def test_v_is_known_from_the_first_state_of_a_free_run_on(grasp_run: Any, tmp_path: Path) -> None:

@@ -135,6 +135,7 @@ class FreeRunning:
                 return
             self._held = {side: Held() for side in self._held}
             self._steering.reset_done()
+            self._timing.pause()
             self._set_anchor()
         if self._steering.halted:
             self._timing.pause()
@@ -223,7 +224,7 @@ class Timing:
         self._overruns += late > self._period
 
     def pause(self) -> None:
-        """The plant is paused: the interval until it goes on is not one of its periods."""
+        """The plant is paused, or was put back: the interval until it goes on is not one of its periods."""
         self._before = math.nan
 
     def age(self, side: str, periods: int, timed_out: bool) -> None:
