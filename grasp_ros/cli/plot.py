@@ -117,17 +117,24 @@ def _motion(source: str, options: argparse.Namespace, span: Span) -> Motion:
     if span is not None and not (options.sampled or scene.sampled):
         first, last = np.clip(sorted(span), 0.0, scene.duration).tolist()
         grid = np.linspace(first, last, GRID_POINTS)
-    run = partial(simulate, scene, sampled=options.sampled, method=options.method, setting=options.step,
-                  sensitivity=options.sensitivity or None)
+    run = partial(simulate, scene, sampled=options.sampled, method=options.method, setting=options.step)
     found = run(grid=grid)
     fine = options.method == EXACT and not options.animate and found.status is Status.DONE
-    return run(grid=with_contacts(found)) if fine and 0 < len(found.event_table) <= MOST_EVENTS else found
+    times = with_contacts(found) if fine else found.t
+    if len(times) > len(found.t):
+        grid = times
+    elif not options.sensitivity:
+        return found
+    return run(grid=grid, sensitivity=options.sensitivity or None)
 
 
 def with_contacts(run: Trajectory) -> Array:
     """Output times of a run, and some more between its events: curves of short impacts reach their peaks."""
     first, last = run.t[[0, -1]]
-    ends = np.unique(np.clip([first, *run.event_table[:, Entry.TIME], last], first, last))
+    times = run.event_table[:, Entry.TIME]
+    ends = np.unique([first, *times[(first < times) & (times < last)], last])
+    if not 2 < len(ends) <= MOST_EVENTS:
+        return run.t
     return np.union1d(run.t, np.linspace(ends[:-1], ends[1:], PER_CONTACT, endpoint=False))
 
 

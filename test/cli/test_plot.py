@@ -10,7 +10,8 @@ import pytest
 from PIL import Image
 
 from grasp_ros import scene
-from grasp_ros.cli.plot import with_contacts
+from grasp_ros.cli import plot
+from grasp_ros.physics.layout import Entry
 from grasp_ros.physics.system import NAMES
 from grasp_ros.simulation import simulate
 
@@ -61,14 +62,51 @@ def test_panels_are_chosen(command: Any, tmp_path: Path) -> None:
     assert "allowed: displacement, input, impact, energy" in command("plot", "case_01", "--panel", "force").stderr
 
 
+@pytest.fixture
+def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """What `grasp plot` would write."""
+    found: list[Any] = []
+    monkeypatch.setattr(plot, "write_figure", lambda figure, _: found.append(figure))
+    return found
+
+
 @pytest.mark.parametrize("name", ["friction", "hammer", "case_03"])
-def test_short_impacts_reach_their_peaks(name: str) -> None:
+def test_short_impacts_reach_their_peaks(command: Any, figures: list[Any], name: str) -> None:
     """An output time each 20 ms misses a tenth of the first impact of friction."""
     run = simulate(scene.load(name))
-    found = simulate(run.scene, grid=with_contacts(run))
-    for body in run.scene.system.contacts:
+    assert command("plot", name, "--panel", "impact").returncode == 0
+    for line, body in zip(figures[0].axes[0].lines, run.scene.system.contacts, strict=True):
         peak = run.contacts(NAMES[body])["peak_force"].max()
-        assert np.nanmax(found.impacts[:, body]) == pytest.approx(peak, rel=3e-3)
+        assert np.nanmax(np.abs(line.get_ydata())) == pytest.approx(peak, rel=3e-3)
+
+
+def test_events_outside_the_time_range_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = simulate(scene.load("case_03"), grid=np.linspace(0.0, 0.6, 7))
+    times = np.unique(run.event_table[:, Entry.TIME])  # both sides touch together
+    inside = np.count_nonzero(times < run.t[-1])
+    assert 0 < inside < 0.5 * len(times)
+    for most, finer in ((inside + 2, True), (inside + 1, False)):  # and both ends
+        monkeypatch.setattr(plot, "MOST_EVENTS", most)
+        assert (len(plot.with_contacts(run)) > len(run.t)) is finer
+
+
+def test_a_scene_is_not_run_again_without_a_finer_result(
+    command: Any, figures: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Derivatives, which take two runs, were computed twice."""
+    asked: list[bool] = []
+
+    def counted(*given: Any, sensitivity: Any = None, **more: Any) -> Any:
+        asked.append(sensitivity is not None)
+        return simulate(*given, sensitivity=sensitivity, **more)
+
+    monkeypatch.setattr(plot, "simulate", counted)
+    short = ("--set", "time.duration_s=1")
+    for words, runs in ((("no_contact",), [False]), (("case_01", "--sensitivity", "object.mass_kg"), [False, True]),
+                        (("case_01", "--from", "0.01", "--to", "0.02"), [False])):
+        assert command("plot", *words, *short).returncode == 0
+        assert asked == runs
+        asked.clear()
 
 
 @pytest.mark.parametrize(
