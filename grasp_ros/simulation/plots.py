@@ -61,7 +61,7 @@ def draw(
     path : Path or str
         The ending decides the format.
     captions : str, or sequence of str, optional
-        Second lines of the titles. Default: the feedback of the scenes, in words.
+        Second lines of the titles. Default: the feedback of the scenes, in words, and why a run stopped.
     width_mm : float, optional
         Default: 230 mm, or 150 mm for each of several motions.
     span : (float, float), s, optional
