@@ -9,7 +9,7 @@ import math
 import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -49,8 +49,11 @@ def show(options: argparse.Namespace, text: str, data: Any) -> None:
     """Print a result: its text, or with `--json` its data; on the standard error if a file goes to the output."""
     stop_if_signalled()
     shown = json.dumps(plain(data), indent=1, ensure_ascii=False) if options.json else text
-    with suppress(BrokenPipeError):  # the reader, `head` say, has had it; the file of `-o` is still to be written
-        print(shown, file=sys.stderr if getattr(options, "output", None) == STDOUT else sys.stdout)
+    stream = sys.stderr if getattr(options, "output", None) == STDOUT else sys.stdout
+    try:
+        print(shown, file=stream)
+    except BrokenPipeError:  # the reader, `head` say, has had it; the file of `-o` is still to be written
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # for what is left of the text
 
 
 def plain(data: Any) -> Any:

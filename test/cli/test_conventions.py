@@ -153,6 +153,9 @@ def test_a_file_is_written_although_nobody_reads_the_table(tmp_path: Path, unbuf
                    PYTHONUNBUFFERED=unbuffered)
     assert (result.returncode, result.stderr) == (0, f"written to {path}\n")
     assert path.exists()
+    words = f"$GRASP simulate case_01 --set time.duration_s=1 -o - 2>&1 >{tmp_path}/run.csv | true"
+    assert shell(f"{words}; exit ${{PIPESTATUS[0]}}", PYTHONUNBUFFERED=unbuffered).returncode == 0
+    assert (tmp_path / "run.csv").read_text().count("\n") == 2002
 
 
 def test_a_table_into_a_closed_output_is_not_lost_in_silence() -> None:
