@@ -164,8 +164,10 @@ def legend_beside(*row: Axes) -> None:
 def plot(axes: Axes, motion: Motion, values: Array, **style: Any) -> None:
     """Plot values (n,) over time, up to one output time beyond the limits of the time axis, so that y fits the rest."""
     first, last = (-np.inf, np.inf) if axes.get_autoscalex_on() else axes.get_xlim()
-    rows = slice(max(np.searchsorted(motion.t, first, "right") - 1, 0), np.searchsorted(motion.t, last) + 1)
-    axes.plot(motion.t[rows], values[rows], **style)
+    begin, end = max(int(np.searchsorted(motion.t, first, "right")) - 1, 0), int(np.searchsorted(motion.t, last)) + 1
+    if motion.t[-1] < first or last < motion.t[0]:  # it has ended before, say, beside a longer one
+        end = begin
+    axes.plot(motion.t[begin:end], values[begin:end], **style)
 
 
 def displacements(axes: Axes, motion: Motion) -> None:
@@ -205,7 +207,7 @@ def energies(axes: Axes, motion: Motion) -> None:
     # One scale for all motions that share the axis: logarithmic where V_c falls far and stays above 0.
     lines = [line for own in axes.get_shared_y_axes().get_siblings(axes) for line in own.get_lines()]
     levels = np.concatenate([line.get_ydata() for line in lines if str(line.get_label()).startswith("V_c")])
-    low, high = levels.min(), levels.max()
+    low, high = (levels.min(), levels.max()) if len(levels) else (np.nan, np.nan)
     axes.autoscale(axis="y")
     axes.set_yscale("log" if 0.0 < low < 0.3 * high else "linear")
     if low >= 0.0 and axes.get_yscale() == "linear":

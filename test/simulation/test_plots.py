@@ -86,6 +86,11 @@ def test_the_height_fits_what_lies_within_the_span() -> None:
                     (levels, run.energy.V_c)):
         assert max(map(abs, axes.get_ylim())) < 1.3 * np.nanmax(np.abs(y[late]))
         assert axes.get_xlim() == (15.0, 20.0)
+    short = simulate(scenes.load("noise", ["time.duration_s=2"]))
+    assert [axes.get_ylim() for axes in compose([short, run], span=(15.0, 20.0)).axes[1::2]] == [
+        axes.get_ylim() for axes in (displacement, inputs, impacts, levels)]
+    stopped = simulate(scenes.load("case_01"), max_events=3)
+    assert not any(len(line.get_xdata()) for line in compose([stopped], span=(15.0, 20.0)).axes[-1].lines)
 
 
 def test_the_title_says_that_a_run_stopped() -> None:
