@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.compilation.jit import inlined, kernel
+from grasp_ros.exact.driver.rest import ENERGY as SCALE
 from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.kinematics import arm_of, reduced_mass
 from grasp_ros.exact.records import Array, Level, Plant, Settings, State
-from grasp_ros.exact.tolerances import DIED_OUT, ENERGY, ENERGY_UNDERFLOW, MAX_IDLE, NEGLECTED
+from grasp_ros.exact.tolerances import DIED_OUT, ENERGY, ENERGY_UNDERFLOW, MAX_IDLE, NEGLECTED, REST
 from grasp_ros.physics.body_energy import body_energy
 from grasp_ros.physics.domain import LARGEST_POSITION, LARGEST_SPEED
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Law, Of, Outcome, Pair, U, V, X
@@ -104,7 +105,8 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
     """Whether a segment of t s, which began with both pairs in `modes`, can be believed.
 
     It must be finite, within the domain, not stalled, without a touch that was missed, and its energy may neither rise
-    nor fall by more than rounding and losses explain. Where a feedback drives an arm (c + Kv < 0) energy may come.
+    nor fall by more than rounding and losses explain, but for the energy of a motion that counts as rest. Where a
+    feedback drives an arm (c + Kv < 0) energy may come.
     """
     y, rise, size = state.y, after.value - before.value, max(after.size, before.size)
     if not math.isfinite(y.sum()):
@@ -118,7 +120,7 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
     if (penetrates(plant, state, LEFT, before.u_l, size, t, part)
             or penetrates(plant, state, RIGHT, before.u_r, size, t, part)):
         return Outcome.PENETRATES
-    rounding = part * size + ENERGY_UNDERFLOW + (
+    rounding = part * size + max(REST * REST * state.rest[SCALE], ENERGY_UNDERFLOW) + (
         set_back(plant, y, LEFT, modes[0], before.u_l, t) + set_back(plant, y, RIGHT, modes[1], before.u_r, t))
     driven = plant.given[LEFT, Of.DAMPING] < 0.0 or plant.given[RIGHT, Of.DAMPING] < 0.0
     if driven or not abs(rise) > rounding:  # nan where energies overflow before the state does
