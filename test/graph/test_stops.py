@@ -116,12 +116,14 @@ def is_seen(observer: Any, name: str) -> bool:
 WRONG_PLANT = """
 import sys
 from grasp_ros.graph import __main__ as start
+from grasp_ros.graph.health import peers
 from grasp_ros.simulation.sampled_plant import SampledPlant
 step = SampledPlant.step
 def push_harder(plant, commands):
     step(plant, 1.5 * commands)
     plant.effort = commands
 SampledPlant.step = push_harder
+peers.LOOK_SECONDS = 0.9  # the monitor ends before the next look
 sys.exit(start.main("plant"))
 """
 

@@ -95,6 +95,11 @@ class PeerNode(GraspNode):
                 self.refuse("second sources", topic, why)
         super().report()
 
+    def begin(self) -> None:
+        """Take note of who is there as it begins: a peer may have ended before the first look."""
+        self.begun, self.concern, self.phase = True, "", Phase.RUNNING
+        self._last.update((need.topic, names) for need in self.needs() if (names := self.sources(need.topic)))
+
     def look(self) -> None:
         """See to it that everybody is there."""
         if self._watchdog.stopped:  # its thread looks first

@@ -143,11 +143,11 @@ class Controller(PeerNode):
         return self._scene is not None and informed and self.linked(self._commands, listeners)
 
     def _start(self) -> None:
-        self.phase = Phase.RUNNING
         self.words = f"running with {self._own.words}" if self._own else "running"
         if not self.begun:  # this tells the plant that the controller is ready, so it comes last
             self._states = self.subscribe(JOINT_STATES, self._on_state, raw=True)
-        self.begun, self._ready_to_answer, self.concern = True, True, ""
+        self._ready_to_answer = True
+        self.begin()
 
     def _begin(self, time_ns: int) -> None:
         """Let the numbers that were set act from a time on, and let all know before the command does."""

@@ -25,7 +25,6 @@ from grasp_ros.graph.lockstep.synchronizer import ARMS, GIVE_UP_SECONDS, UNCERTA
 from grasp_ros.graph.nodes.lyapunov_monitor import MOST_BYTES, LyapunovMonitor
 from grasp_ros.graph.nodes.picture import Picture
 from grasp_ros.graph.ros.messages import UNREADABLE
-from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.serialization import raw_command, template_of
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene, topics
@@ -135,7 +134,7 @@ class Monitor(PeerNode):
         self._recorder = Recorder(self._path, scene, versions(), names, running)
         self._soon = self.wall_timer(MOST_SECONDS, self._complete)
         self._soon.cancel()
-        self.begun, self.concern, self.phase = True, "", Phase.RUNNING
+        self.begin()
         self.words = f"recording {running.words}; {scene.certificate_in_words(sampled=True)}"
         self.get_logger().info(self.words)
         self._laws = [self.subscribe(topics.CHANGES[side], partial(self._on_announcement, side), raw=True)

@@ -167,8 +167,8 @@ class Plant(PeerNode):
         )
 
     def _start(self) -> None:
-        self.phase, self.words = Phase.RUNNING, "running"
-        self.begun, self.concern = True, ""
+        self.begin()
+        self.words = "running"
         self.heartbeats.tell()  # with the digests of its texts
         self._begin = time.monotonic()
         self.publish_state()
