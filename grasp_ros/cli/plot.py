@@ -120,10 +120,8 @@ def _motion(source: str, options: argparse.Namespace, span: Span) -> Motion:
     run = partial(simulate, scene, sampled=options.sampled, method=options.method, setting=options.step)
     found = run(grid=grid)
     fine = options.method == EXACT and not options.animate and found.status is Status.DONE
-    times = with_contacts(found) if fine else found.t
-    if len(times) > len(found.t):
-        grid = times
-    elif not options.sensitivity:
+    grid = with_contacts(found) if fine else found.t
+    if len(grid) == len(found.t) and not options.sensitivity:
         return found
     return run(grid=grid, sensitivity=options.sensitivity or None)
 

@@ -77,7 +77,8 @@ class Integrator:
     Raises
     ------
     Refused
-        If the system is none, the accuracy outside its range, a budget no whole number, or the state not finite.
+        If `system` is not a System, the accuracy is outside its range, a budget is not a whole number, or the state is
+        not finite.
     """
 
     def __init__(

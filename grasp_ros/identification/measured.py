@@ -102,7 +102,7 @@ def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> M
 def _of_recording(recording: Recording, by_sensors: bool) -> Measured:
     name = str(recording.path)
     if not recording.whole:
-        why = f"resets: {len(recording.starts) - 1}" if len(recording.starts) > 1 else "not all ticks of its run"
+        why = f"resets: {recording.resets}" if recording.resets else "not all ticks of its run"
         raise Refused(f"{name}: {why}; allowed: a bag of one run from its begin, with all of its ticks")
     others = [side for side, answers in answers_of(recording).items() if answers.differs]
     why_unknown = ""

@@ -78,7 +78,8 @@ class Steering:
             busy = "a reset is on its way" if self.reset_due else f"{self.steps} steps are still to go"
             return self._answer(response, f"{busy}; allowed: one step or reset at a time")
         if wanted > left:
-            return self._answer(response, f"steps: {wanted} is not allowed; allowed: at most {left}, up to its end")
+            most = f"at most {left}, up to the end of the scene"
+            return self._answer(response, f"steps: {wanted} is not allowed; allowed: {most}")
         self.steps, goal = wanted, plant.tick + wanted
         plant.loop.advance()
         return self._answer(response, goal={"tick": goal, "state": PAUSED}, asked=wanted)
