@@ -59,7 +59,7 @@ def initial_slide(plant: Plant, state: State) -> None:
     apply_friction(plant, state.mode)
 
 
-@kernel
+@inlined
 def begin_interval(plant: Plant, state: State, out: Output) -> None:
     """Set the modes under the inputs of a new interval, or the first of a run; a resumed interval keeps them."""
     mode = state.mode
@@ -75,8 +75,11 @@ def begin_interval(plant: Plant, state: State, out: Output) -> None:
     if state.clock[0] > 0.0:
         apply_friction(plant, mode)
         return
-    settle_object(plant, state, out)
+    if plant.coulomb > 0.0:
+        settle_object(plant, state, out)
     for _ in range(2):  # a pair that is pushed back may push the other one back, too
+        if mode[LEFT] != Pair.LEAVING and mode[RIGHT] != Pair.LEAVING:
+            return
         left, right = mode_at_tick(plant, state, LEFT), mode_at_tick(plant, state, RIGHT)
         settle(state, LEFT, left, out)
         settle(state, RIGHT, right, out)

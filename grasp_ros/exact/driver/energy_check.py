@@ -69,7 +69,7 @@ def losses(plant: Plant, before: Level, modes: tuple[int, int], size: float, t: 
     return loss
 
 
-@kernel
+@inlined
 def set_back(plant: Plant, y: Array, side: Body, mode: int, u: float, t: float) -> float:
     """Energy in J of V by which an arm may change in a touch, which moves it to u = 0.
 

@@ -36,19 +36,27 @@ def is_far(plant: Plant, y: Array, side: Body, span: float) -> bool:
     return 1.01 * way < -y[U.L + side] and arm[Of.DAMPING] >= 0.0 and body[Of.DAMPING] >= 0.0
 
 
-@kernel
+@inlined
 def pair_candidate(row: Array, plant: Plant, state: State, flight: Segment, side: Body, until: float, work: Integers
                    ) -> tuple[Candidate, float]:
     """First event of one pair in a flight, unless it is later than `until`.
 
     The second value is the time at which `first_root` gave up.
     """
-    mode, y, span = state.mode[side], state.y, flight.t
+    mode = state.mode[side]
     if mode in (Pair.RESTING, Pair.ABSENT, Pair.BEGINNING):
         return Candidate(math.inf, Transition.TOUCH), math.inf
-    if mode == Pair.OPEN and is_far(plant, y, side, span):
+    if mode == Pair.OPEN and is_far(plant, state.y, side, flight.t):
         work[Work.ROOT_ITERATIONS] += 1
         return Candidate(math.inf, Transition.TOUCH), math.inf
+    return search(row, plant, state, flight, side, until, work)
+
+
+@kernel
+def search(row: Array, plant: Plant, state: State, flight: Segment, side: Body, until: float, work: Integers
+           ) -> tuple[Candidate, float]:
+    """The same of a pair that is closed, or near enough."""
+    mode, y, span = state.mode[side], state.y, flight.t
     pair = pair_in_flight(plant, y, flight.flights, side)
     t, d = 0.0, approach(y, side)
     at = Motion(pair.arm_flight.x, pair.arm_flight.v, pair.body_flight.x, pair.body_flight.v, pair.u, d, abs(pair.u))
@@ -91,8 +99,11 @@ def flight_ends(row: Array, plant: Plant, state: State, segment: Segment, work: 
     slide = slide_in_flight(plant, state)
     if math.isnan(left.when) or math.isnan(right.when):
         return Ends(left, right, slide, math.nan)
-    begun = min(force_free_time(row, plant, state, LEFT), force_free_time(row, plant, state, RIGHT))
-    return Ends(left, right, slide, min(segment.t, left.when, right.when, slide.when, known_l, known_r, begun))
+    known = min(segment.t, left.when, right.when, slide.when, known_l, known_r)
+    for side in (LEFT, RIGHT):
+        if state.mode[side] == Pair.BEGINNING:
+            known = min(known, force_free_time(row, plant, state, side))
+    return Ends(left, right, slide, known)
 
 
 @inlined
