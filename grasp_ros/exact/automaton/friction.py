@@ -13,7 +13,7 @@ from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.contact.series import expand_force
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.kinematics import approach, rate_lanes
-from grasp_ros.exact.numerics.polynomial import values
+from grasp_ros.exact.numerics.polynomial import lane_range, values
 from grasp_ros.exact.numerics.roots import first_rise, value_and_rate
 from grasp_ros.exact.records import Array, Candidate, Integers, Plant, Push, State, Tables
 from grasp_ros.exact.tolerances import FRICTION, SLIDES
@@ -120,6 +120,40 @@ def noise_at(tables: Tables, plant: Plant, mode: Integers, n: int, s: float) -> 
 
 
 @inlined
+def impact_range(tables: Tables, plant: Plant, side: Body, h: float) -> tuple[float, float, float]:
+    """Bounds (low, high) on the impact of a pair in contact on a stuck object within a step of length h, N; its size.
+
+    The ranges of the lanes give them, and `size` is what their roundings are a part of.
+    """
+    c, size, at, (front, back), z = tables.c, tables.size, tables.at, rate_lanes(side), Z.L + side
+    (low, high), (slow, fast) = lane_range(c, size, z, h, at[z]), lane_range(c, size, front, h, at[front])
+    still, moving = lane_range(c, size, back, h, at[back])
+    low, high = max(min(low, c[z]), 0.0), max(high, c[z])
+    slow, fast = min(slow, c[front]) - max(moving, c[back]), max(fast, c[front]) - min(still, c[back])
+    hertzian, loss = plant.pairs[side, Law.HERTZIAN], plant.pairs[side, Law.DISSIPATION]
+    weak, strong = elastic_force(hertzian, low * low), elastic_force(hertzian, high * high)
+    return (weak * max(damping_factor(loss, slow), 0.0), strong * max(damping_factor(loss, fast), 0.0),
+            strong * damping_factor(loss, max(abs(slow), abs(fast))))
+
+
+@inlined
+def stays_stuck(tables: Tables, plant: Plant, mode: Integers, h: float) -> bool:
+    """Whether bounds on the impacts, far cheaper than their series, prove that a stuck object does not slip in a step.
+
+    `tables.at` holds the values at its end h.
+    """
+    push = plant.given[OBJECT, Of.FORCE]
+    left, right, rounding = push, push, still_noise(plant)
+    for side in (LEFT, RIGHT):
+        if mode[side] == Pair.CONTACT:
+            low, high, size = impact_range(tables, plant, side, h)
+            left += low if side == LEFT else -high
+            right += high if side == LEFT else -low
+            rounding += FRICTION * size
+    return max(-left, right) + rounding < plant.coulomb
+
+
+@inlined
 def excess(tables: Tables, plant: Plant, n: int, s: float) -> float:
     """By how much the force on the object at s, with the impacts `tables.row`, exceeds its friction, N."""
     return abs(value_and_rate(tables.row, n, s)[0] + plant.given[OBJECT, Of.FORCE]) - plant.coulomb
@@ -179,6 +213,9 @@ def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: floa
     """
     slide, row, c = state.mode[OBJECT], tables.row, tables.c
     if slide != Slide.STUCK:
+        low, high = lane_range(c, tables.size, V.O, h, tables.at[V.O])
+        if min(c[V.O], low) > 0.0 or max(c[V.O], high) < 0.0:
+            return Candidate(math.inf, Slide.STUCK)
         factor = -1.0 if slide == Slide.RIGHTWARD else 1.0
         for k in range(n + 1):
             row[k] = factor * c[LANES * k + V.O]
@@ -187,6 +224,8 @@ def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: floa
             if abs(row[1]) <= SLIDES * accelerating:
                 row[1] = 0.0
         return Candidate(first_rise(row, n, h, 0.0, work), Slide.STUCK)
+    if stays_stuck(tables, plant, state.mode, h):
+        return Candidate(math.inf, Slide.STUCK)
     impact_series(tables, plant, state.mode, n)
     noise = push_on_object(plant, state).rounding
     begin, end = excess(tables, plant, n, 0.0), excess(tables, plant, n, h)

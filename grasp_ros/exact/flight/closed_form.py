@@ -8,8 +8,9 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.compilation.jit import inlined, kernel, whole
+from grasp_ros.exact.kinematics import rates_of
 from grasp_ros.exact.numerics.polynomial import INVERSE
-from grasp_ros.exact.records import Array, Flight, Flights, Flown, Order, Plant, Regime, Step
+from grasp_ros.exact.records import Array, Flight, Flights, Flown, Order, Plant, Rates, Regime, Step
 from grasp_ros.exact.tolerances import FAR, FAR_SHORT, SETTLED, SHORT_FLIGHT
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Of, V, X
 
@@ -123,19 +124,24 @@ def short_flight(v: float, push: float, sigma: float, omega0_2: float, t: float)
 def expand_flight(bodies: Array, flights: Flights, t: float, c: Array) -> None:
     """Write the Taylor table about the time t of flight: positions and velocities in their places of the state.
 
-    Within half of the time constants one table serves many outputs: a polynomial costs less than a closed form.
+    Within half of the time constants one table serves many outputs: a polynomial costs less than a closed form. Order
+    by order, so that the bodies do not wait for each other.
     """
+    left, body, right = rates_of(bodies[LEFT]), rates_of(bodies[OBJECT]), rates_of(bodies[RIGHT])
     for i in range(LANES):
         c[i] = 0.0
-    for body, lane, flight in ((LEFT, X.L, flights.left), (OBJECT, X.O, flights.object), (RIGHT, X.R, flights.right)):
-        row = bodies[body]
-        m = row[Of.MASS]
-        force, k, d = row[Of.FORCE] / m, row[Of.STIFFNESS] / m, row[Of.DAMPING] / m
-        x, v, _, _ = fly(flight, t)
-        c[lane], c[lane + 1] = x, v
-        for n in range(FLIGHT_ORDER):
-            share = 1.0 / (n + 1)
-            x, v = share * v, share * ((force - k * x) - d * v)
-            force = 0.0
-            i = LANES * (n + 1) + lane
-            c[i], c[i + 1] = x, v
+    c[X.L], c[V.L], _, _ = fly(flights.left, t)
+    c[X.O], c[V.O], _, _ = fly(flights.object, t)
+    c[X.R], c[V.R], _, _ = fly(flights.right, t)
+    for n in range(FLIGHT_ORDER):
+        write_next(c, n, X.L, left)
+        write_next(c, n, X.O, body)
+        write_next(c, n, X.R, right)
+
+
+@inlined
+def write_next(c: Array, n: int, lane: int, rates: Rates) -> None:
+    """Write the order n + 1 of a body's flight; a constant force is in the first one alone."""
+    i, share, force = LANES * n + lane, INVERSE[n + 1], rates.force if n == 0 else 0.0
+    c[i + LANES] = share * c[i + 1]
+    c[i + LANES + 1] = share * ((force - rates.stiffness * c[i]) - rates.damping * c[i + 1])
