@@ -124,24 +124,22 @@ def short_flight(v: float, push: float, sigma: float, omega0_2: float, t: float)
 def expand_flight(bodies: Array, flights: Flights, t: float, c: Array) -> None:
     """Write the Taylor table about the time t of flight: positions and velocities in their places of the state.
 
-    Within half of the time constants one table serves many outputs: a polynomial costs less than a closed form. Order
-    by order, so that the bodies do not wait for each other.
+    Within half of the time constants one table serves many outputs: a polynomial costs less than a closed form. Numbers
+    of three bodies side by side, in registers, do not wait for each other.
     """
     left, body, right = rates_of(bodies[LEFT]), rates_of(bodies[OBJECT]), rates_of(bodies[RIGHT])
-    for i in range(LANES):
-        c[i] = 0.0
-    c[X.L], c[V.L], _, _ = fly(flights.left, t)
-    c[X.O], c[V.O], _, _ = fly(flights.object, t)
-    c[X.R], c[V.R], _, _ = fly(flights.right, t)
-    for n in range(FLIGHT_ORDER):
-        write_next(c, n, X.L, left)
-        write_next(c, n, X.O, body)
-        write_next(c, n, X.R, right)
+    x_l, v_l, _, _ = fly(flights.left, t)
+    x_o, v_o, _, _ = fly(flights.object, t)
+    x_r, v_r, _, _ = fly(flights.right, t)
+    for n in range(FLIGHT_ORDER + 1):
+        i, share, one = LANES * n, INVERSE[n + 1], 1.0 if n == 0 else 0.0
+        c[i + X.L], c[i + V.L], c[i + X.O], c[i + V.O], c[i + X.R], c[i + V.R] = x_l, v_l, x_o, v_o, x_r, v_r
+        x_l, v_l = next_terms(left, one, x_l, v_l, share)
+        x_o, v_o = next_terms(body, one, x_o, v_o, share)
+        x_r, v_r = next_terms(right, one, x_r, v_r, share)
 
 
 @inlined
-def write_next(c: Array, n: int, lane: int, rates: Rates) -> None:
-    """Write the order n + 1 of a body's flight; a constant force is in the first one alone."""
-    i, share, force = LANES * n + lane, INVERSE[n + 1], rates.force if n == 0 else 0.0
-    c[i + LANES] = share * c[i + 1]
-    c[i + LANES + 1] = share * ((force - rates.stiffness * c[i]) - rates.damping * c[i + 1])
+def next_terms(rates: Rates, one: float, x: float, v: float, share: float) -> tuple[float, float]:
+    """The next coefficients of position and velocity; `one` is 1 in order 0, which the constant force follows."""
+    return share * v, share * ((one * rates.force - rates.stiffness * x) - rates.damping * v)
