@@ -51,12 +51,15 @@ class Measured(NamedTuple):
     inputs: Array | None  # (n - 1, 3) N by body, from each sample to the next
     sampled: bool  # whether commands are held over control periods
     why_unknown: str = ""  # why what acted does not follow from the controllers of the scene; empty if it does
+    unused: bool = False  # whether a table has inputs, which a scene without `loop` does not hold
 
     @property
     def acting(self) -> str:
         """What acts on the bodies, in words."""
         if self.inputs is not None:
             return "the inputs of the data"
+        if self.unused:
+            return "the continuous feedback of the scene (forces in the table act only in a scene with loop)"
         return "the held commands of the scene" if self.sampled else "the continuous feedback of the scene"
 
     @property
@@ -133,7 +136,8 @@ def _of_table(path: Path, scene: Scene) -> Measured:
     t, inputs = columns[T], None
     missing = np.full(len(t), np.nan)
     state = np.stack([columns.get(name, missing) for name in CHANNELS], axis=1)
-    if scene.sampled and not columns.keys().isdisjoint((*INPUTS, *COMMANDS)):
+    has_inputs = not columns.keys().isdisjoint((*INPUTS, *COMMANDS))
+    if scene.sampled and has_inputs:
         driven = {*scene.system.laws, *(force.body for force in scene.system.external)}
         lacks = [name for body, name in enumerate(INPUTS) if body in driven and name not in columns]
         if lacks:
@@ -145,7 +149,7 @@ def _of_table(path: Path, scene: Scene) -> Measured:
                           f" {scene.time_of(1):g} s from 0 to {scene.duration:g} s, at which its inputs change")
         t, nothing = ticks, np.zeros(len(t))
         inputs = np.stack([columns.get(name, nothing) for name in INPUTS], axis=1)[:-1]
-    return Measured(str(path), scene, t, state, inputs, scene.sampled)
+    return Measured(str(path), scene, t, state, inputs, scene.sampled, unused=has_inputs and not scene.sampled)
 
 
 def _columns(path: Path) -> Mapping[str, Array]:

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from grasp_ros.exact.compilation.jit import kernel
+from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.impact import energy_quotient
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.contract import Problem, Solution
@@ -40,7 +40,7 @@ def solve(problem: Problem) -> Solution:
     return Solution(out[:rows], np.empty((0, 5)), work, Status[Outcome(outcome).name])
 
 
-@kernel
+@inlined
 def mean_force(hertzian: float, loss: float, u0: float, u1: float, h: float) -> Any:
     """F of the step and its derivative by u1."""
     elastic, slope = energy_quotient(u0, u1)
@@ -50,7 +50,7 @@ def mean_force(hertzian: float, loss: float, u0: float, u1: float, h: float) -> 
     return hertzian * elastic * factor, hertzian * (slope * factor + elastic * loss / h)
 
 
-@kernel
+@inlined
 def forces(q: Any, h: float, u_l: float, u_r: float, free_l: float, free_r: float, give: Any, work: Any) -> Any:
     """Mean impact forces of a step by Newton's method for the penetrations at its end; nan if it does not converge.
 
@@ -83,7 +83,7 @@ def forces(q: Any, h: float, u_l: float, u_r: float, free_l: float, free_r: floa
     return math.nan, math.nan
 
 
-@kernel
+@inlined
 def advance(q: Any, y: Any, h: float, work: Any) -> Any:
     """One step.
 
@@ -107,7 +107,7 @@ def advance(q: Any, y: Any, h: float, work: Any) -> Any:
     )
 
 
-@kernel
+@inlined
 def within(y: Any, z: Any, h: float, part: float) -> Any:
     """State inside a step: linear velocities, and positions that agree with them."""
     a, b, c = y[1] + part * (z[1] - y[1]), y[3] + part * (z[3] - y[3]), y[5] + part * (z[5] - y[5])

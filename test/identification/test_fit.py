@@ -168,6 +168,7 @@ def test_a_table_says_what_its_run_says(tmp_path: Path, loop: tuple[str, ...]) -
     run.to_csv(tmp_path / "run.csv")
     found, same = (fit(data, [H_LEFT, P_LEFT], scene) for data in (tmp_path / "run.csv", run))
     assert found.estimates.tolist() == same.estimates.tolist()
+    assert ("forces in the table act only in a scene with loop" in str(found)) == (not loop)
     off = np.abs(found.estimates - [1e4, 0.1]) / np.sqrt(np.diag(found.covariance))
     assert ((off > 0.01) & (off < 4.0)).all()
 
