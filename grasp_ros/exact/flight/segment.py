@@ -49,12 +49,12 @@ def pair_candidate(row: Array, plant: Plant, state: State, flight: Segment, side
     if mode == Pair.OPEN and is_far(plant, state.y, side, flight.t):
         work[Work.ROOT_ITERATIONS] += 1
         return Candidate(math.inf, Transition.TOUCH), math.inf
-    return search(row, plant, state, flight, side, until, work)
+    return search_pair(row, plant, state, flight, side, until, work)
 
 
 @kernel
-def search(row: Array, plant: Plant, state: State, flight: Segment, side: Body, until: float, work: Integers
-           ) -> tuple[Candidate, float]:
+def search_pair(row: Array, plant: Plant, state: State, flight: Segment, side: Body, until: float, work: Integers
+                ) -> tuple[Candidate, float]:
     """The same of a pair that is closed, or near enough."""
     mode, y, span = state.mode[side], state.y, flight.t
     pair = pair_in_flight(plant, y, flight.flights, side)
