@@ -133,9 +133,9 @@ def run(q: Any, y: Any, duration: float, grid: Any, step: float, out: Any, work:
         work[Work.STEPS] += 1
         total = z[0] + z[1] + z[2] + z[3] + z[4] + z[5]
         if not math.isfinite(total):
-            return Outcome.STALLED if math.isnan(total) else Outcome.NOT_FINITE, row
+            return (Outcome.STALLED if math.isnan(total) else Outcome.NOT_FINITE).value, row
         while row < grid.shape[0] and grid[row] <= end:
             out[row] = within(y, z, h, (grid[row] - t) / (end - t))
             row += 1
         y, t = z, end
-    return Outcome.DONE, row
+    return Outcome.DONE.value, row

@@ -198,7 +198,7 @@ def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out:
             after = condition(q, y, side) if rule == PAPER else mode[side]
             if after != mode[side] and changed[side] != t:  # one that changes here has u at a rounding of either sign
                 if found == events.shape[0]:
-                    return Outcome.EVENTS_FULL, row, found
+                    return Outcome.EVENTS_FULL.value, row, found
                 found = change(events, found, t, side, mode, after, y)
         while t < end:
             h = end - t
@@ -218,13 +218,13 @@ def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out:
                 row = deliver(rule == PAPER and theta <= 1.0, y, f, z, g, t, reached, grid, out, row)
             idle = 0 if reached - t > SLIVER * step else idle + 1
             if idle > MAX_IDLE:
-                return Outcome.STALLED, row, found
+                return Outcome.STALLED.value, row, found
             y, t = z, reached
             if theta <= 1.0:
                 if found == events.shape[0]:
-                    return Outcome.EVENTS_FULL, row, found
+                    return Outcome.EVENTS_FULL.value, row, found
                 found = change(events, found, t, side, mode, after, y)
                 changed[side], free[side] = t, rule == LOCATED
         if not math.isfinite(y[0] + y[1] + y[2] + y[3] + y[4] + y[5]):
-            return Outcome.NOT_FINITE, row, found
-    return Outcome.DONE, row, found
+            return Outcome.NOT_FINITE.value, row, found
+    return Outcome.DONE.value, row, found

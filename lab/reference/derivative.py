@@ -20,7 +20,10 @@ DIGITS = 30
 
 
 class Derivative(NamedTuple):
-    """Derivatives by one number, at fixed times; those of the times of contacts by side."""
+    """Derivatives by one number, at fixed times; those of the times of contacts by side.
+
+    They are empty where the two motions have not as many: mirror images, say.
+    """
 
     state: Array  # (m, 6)
     touches: tuple[list[float], list[float]]  # s
@@ -28,13 +31,7 @@ class Derivative(NamedTuple):
 
 
 def difference(scene: Scene, key: str, times: Sequence[float]) -> Derivative:
-    """A central difference, or a one-sided one of a number at 0 that cannot be negative.
-
-    Raises
-    ------
-    ValueError
-        If the two motions do not have the same contacts.
-    """
+    """A central difference, or a one-sided one of a number at 0 that cannot be negative."""
     section, _, name = key.partition(".")
     value = scene.values[section][name]
     step = STEP * max(1.0, 2.0 ** round(math.log2(abs(value) or 1.0)))
@@ -50,5 +47,5 @@ def difference(scene: Scene, key: str, times: Sequence[float]) -> Derivative:
 
 def _times(first: Reference, second: Reference, width: float, place: int) -> tuple[list[float], list[float]]:
     left, right = ([float((b - a) / width) for a, b in zip(first[place][side], second[place][side], strict=True)]
-                   for side in SIDES)
+                   if len(first[place][side]) == len(second[place][side]) else [] for side in SIDES)
     return left, right

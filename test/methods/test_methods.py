@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+
 import numpy as np
 import pytest
 from documents import horizon, stalling
@@ -194,3 +196,23 @@ def test_events_without_progress_end_with_a_status() -> None:
     motion = simulate(horizon("v_jump_one_sided", 5.0), method="lsoda_events", setting=stalling())
     assert motion.status is Status.STALLED
     assert motion.t[-1] < 5.0
+
+
+@pytest.mark.parametrize("method", ["rk4", "discrete_gradient"])
+def test_a_signal_ends_a_long_run_with_what_its_handler_raises(method: str) -> None:
+    """As Ctrl-C does. The value that a kernel returns must not be made by Python code, where the handler would run."""
+    class LateError(Exception):
+        pass
+
+    def late(*_: object) -> None:
+        raise LateError
+
+    simulate(scenes.load("case_01"), method=method, setting=1e-3)  # which loads its machine code
+    before = signal.signal(signal.SIGALRM, late)
+    signal.setitimer(signal.ITIMER_REAL, 0.05)
+    try:
+        with pytest.raises(LateError):
+            simulate(scenes.load("case_01"), method=method, setting=2e-6)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
