@@ -209,6 +209,18 @@ def test_a_recovered_bag_is_one_for_other_readers(tmp_path: Path, closed: Path, 
     assert "killed_recovered: already exists; allowed: a new directory" in again.stderr
 
 
+@pytest.mark.parametrize(("name", "new"), [("p_0.1", "p_0.1_recovered"), (".", "../here_recovered"),
+                                          ("bag.mcap", "bag_recovered")])
+def test_a_recovered_bag_lies_beside_the_old_one(
+    tmp_path: Path, closed: Path, command: Any, monkeypatch: pytest.MonkeyPatch, name: str, new: str
+) -> None:
+    shutil.copytree(closed, tmp_path / "here" / "p_0.1")
+    shutil.copy(storage(closed), tmp_path / "here")
+    monkeypatch.chdir(tmp_path / "here")
+    assert command("recover", name).returncode == 0
+    assert Path(new, "metadata.yaml").is_file()
+
+
 def test_a_second_bag_behind_the_first_is_named(tmp_path: Path, closed: Path, run: Trajectory) -> None:
     both = put(tmp_path / "both", 2 * storage(closed).read_bytes())
     found, size = recover(both, tmp_path / "new"), storage(closed).stat().st_size
