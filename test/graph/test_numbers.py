@@ -180,6 +180,20 @@ def test_a_tick_that_cannot_be_true_is_refused_and_left_out_of_what_is_recovered
     assert bag.read(tmp_path / "new").tick.tolist() == [tick for tick in range(11) if tick != 5]
 
 
+@pytest.mark.parametrize(("value", "why"), [(np.nan, "/left/effort_command: a number is not finite"), (1.0, "")])
+def test_a_command_of_a_free_run_that_cannot_be_read_is_left_out(tmp_path: Path, value: float, why: str) -> None:
+    """The recovered bag had it, too, and could not be read."""
+    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
+    ticks = list(study.ticks_of(run))
+    there = dict(ticks[5][1])
+    ticks[5] = ticks[5][0], [*{**there, LEFT_COMMAND: changed(
+        LEFT_COMMAND, there[LEFT_COMMAND], "wrench.force.x", value)}.items()]
+    written(tmp_path / "bag", run.scene, ticks, running=Running(real_time_factor=1.0))
+    found = recover(tmp_path / "bag", tmp_path / "new")
+    assert [left.startswith(f"parts of 1 ticks, the first 5: {why}") for left in found.left_out] == [True] * bool(why)
+    assert len(bag.read(tmp_path / "new").held["left"]) == 11 - bool(why)
+
+
 @pytest.mark.parametrize("name", LYAPUNOV_NAMES)
 @pytest.mark.parametrize("value", [1e9, np.nan])
 def test_every_number_of_the_monitor_is_verified(tmp_path: Path, name: str, value: float) -> None:

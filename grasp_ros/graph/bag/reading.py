@@ -64,9 +64,7 @@ def _recording(opened: Opened) -> Recording:
             elif topic == topics.TIMING:
                 timing.extend(_timing(quality, stored))
             elif topic in held:  # a command of a free run, which belongs to no tick
-                held[topic].append(reader.numbers(topic, stored.cdr)[-1])
-                if not abs(held[topic][-1]) <= LARGEST:
-                    raise BagError(f"{stored.topic}: {NOT_FINITE}")
+                held[topic].append(reader.force(topic, stored))
             else:
                 check_own(opened, topic, stored)
         row = reader.row(time_ns, tick) if tick else []
@@ -220,6 +218,13 @@ class Ticks:
     def numbers(self, topic: Topic, cdr: bytes) -> Sequence[float]:
         """Seconds, nanoseconds and numbers of a message."""
         return self._templates[topic].read(cdr) or self._decoded(topic, cdr)
+
+    def force(self, topic: Topic, stored: Stored) -> float:
+        """Force of a command of a free run."""
+        force = self.numbers(topic, stored.cdr)[-1]
+        if not abs(force) <= LARGEST:
+            raise BagError(f"{stored.topic}: {NOT_FINITE}")
+        return force
 
     def _decoded(self, topic: Topic, cdr: bytes) -> list[float]:
         """Time and numbers of a message of another program, in the order of those of a recorder."""

@@ -60,6 +60,8 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
                     check_own(opened, topic, stored)
                     if topic in CHANGES.values():
                         changes.add(topic, stored)
+                    elif topic in opened.held:
+                        reader.force(topic, stored)
                 except UNREADABLE as error:
                     note(error, number)
                     continue
