@@ -210,11 +210,12 @@ def test_a_recovered_bag_is_one_for_other_readers(tmp_path: Path, closed: Path, 
 
 
 @pytest.mark.parametrize(("name", "new"), [("p_0.1", "p_0.1_recovered"), (".", "../here_recovered"),
-                                          ("bag.mcap", "bag_recovered")])
+                                          ("bag.mcap", "bag_recovered"), ("\udcff", "\udcff_recovered")])
 def test_a_recovered_bag_lies_beside_the_old_one(
     tmp_path: Path, closed: Path, command: Any, monkeypatch: pytest.MonkeyPatch, name: str, new: str
 ) -> None:
-    shutil.copytree(closed, tmp_path / "here" / "p_0.1")
+    for directory in ("p_0.1", "\udcff"):  # the second one is not UTF-8
+        shutil.copytree(closed, tmp_path / "here" / directory)
     shutil.copy(storage(closed), tmp_path / "here")
     monkeypatch.chdir(tmp_path / "here")
     assert command("recover", name).returncode == 0

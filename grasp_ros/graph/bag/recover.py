@@ -11,6 +11,7 @@ from grasp_ros.graph.bag import BagError
 from grasp_ros.graph.bag.opening import UNREADABLE, Opened
 from grasp_ros.graph.bag.reading import Changes, Ticks, check_own, ticks_of
 from grasp_ros.graph.bag.recorder import Recorder
+from grasp_ros.physics.errors import printable
 from grasp_ros.scene.topics import CHANGES, CLOCK, RUN, SCENE
 
 MOST_REASONS = 20  # that are listed
@@ -71,8 +72,10 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
         left_out = [f"{size} bytes from byte {offset} on: {why}" for offset, size, why in opened.storage.left_out]
         left_out += [f"{why}: {count}" for why, count in opened.left_out.items()]
         left_out += [f"parts of {len(at)} ticks, the first {at[0]}: {why}" for why, at in refused.items()]
+        left_out = [*map(printable, left_out)]  # names of topics, say, which may be anything
         if recorder is not None:
-            recorder.close({"recovered from": str(opened.path), "what was left out": "; ".join(left_out) or "none"})
+            source, lost = printable(str(opened.path)), "; ".join(left_out) or "none"
+            recorder.close({"recovered from": source, "what was left out": lost})
     if recorder is None:
         reasons = (*(why for _, _, why in opened.storage.left_out), *refused, "it holds no tick")
         raise BagError(f"{opened.path}: nothing can be recovered: {reasons[0]}")
