@@ -204,6 +204,9 @@ def test_a_recovered_bag_is_one_for_other_readers(tmp_path: Path, closed: Path, 
         assert reader.message_count == 7 * ticks + 2
         assert sum(1 for _ in reader.messages()) == 7 * ticks + 2
     assert {entry.name for entry in path.iterdir()} == {"bag.mcap"}
+    shown = command("inspect", "killed_recovered").stdout
+    assert "\nrecovered from           killed\nwhat was left out        " in shown
+    assert " on: the rest of a record is missing\n" in shown
     again = command("recover", "killed")
     assert again.returncode == 2
     assert "killed_recovered: already exists; allowed: a new directory" in again.stderr

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from grasp_ros.graph.bag import BagError
 from grasp_ros.graph.bag.opening import UNREADABLE, Opened
 from grasp_ros.graph.bag.reading import Changes, Ticks, check_own, ticks_of
-from grasp_ros.graph.bag.recorder import Recorder
+from grasp_ros.graph.bag.recorder import LEFT_OUT, SOURCE, Recorder
 from grasp_ros.physics.errors import printable
 from grasp_ros.scene.topics import CHANGES, CLOCK, RUN, SCENE
 
@@ -75,7 +75,7 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
         left_out = [*map(printable, left_out)]  # names of topics, say, which may be anything
         if recorder is not None:
             source, lost = printable(str(opened.path)), "; ".join(left_out) or "none"
-            recorder.close({"recovered from": source, "what was left out": lost})
+            recorder.close({SOURCE: source, LEFT_OUT: lost})
     if recorder is None:
         reasons = (*(why for _, _, why in opened.storage.left_out), *refused, "it holds no tick")
         raise BagError(f"{opened.path}: nothing can be recovered: {reasons[0]}")
