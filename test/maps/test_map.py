@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial, reduce
 from operator import getitem
 from pathlib import Path
@@ -139,6 +140,16 @@ def test_it_goes_on_after_a_kill_and_computes_only_the_rest(
 
 
 compute = runs.compute
+
+
+def test_threads_that_begin_the_same_map_make_one(tmp_path: Path, tiny_chunks: None) -> None:
+    together, plan = tmp_path / "together.zarr", small_plan()
+    with ThreadPoolExecutor(3) as pool:
+        for begun in [pool.submit(run, plan, together) for _ in range(3)]:
+            begun.result()
+    run(plan, tmp_path / "alone.zarr")
+    assert_same(together, tmp_path / "alone.zarr")
+    assert {path.name for path in tmp_path.iterdir()} == {"together.zarr", "alone.zarr"}
 
 
 @pytest.mark.slow
