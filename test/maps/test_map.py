@@ -8,10 +8,12 @@ import re
 import resource
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import partial, reduce
 from operator import getitem
 from pathlib import Path
@@ -306,6 +308,30 @@ def test_a_worker_that_dies_takes_no_row_with_it(tmp_path: Path, tiny_chunks: No
         assert len(set(client.run(os.getpid).values()) - set(workers.values())) <= 1
     assert reached == list(range(61))
     assert_same(tmp_path / "cluster.zarr", tmp_path / "alone.zarr")
+
+
+@pytest.mark.slow
+def test_workers_start_beside_another_cluster(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    with socket.socket() as other:
+        with suppress(OSError):  # another one is there
+            other.bind(("127.0.0.1", 8787))
+            other.listen()
+        run(small_plan(), tmp_path / "map.zarr", workers=1)
+    assert not [each for each in recwarn if "8787" in str(each.message)]
+    assert (read(tmp_path / "map.zarr")["status"].values == STATUSES.index("REFUSED")).sum() == 24
+
+
+@pytest.mark.slow
+def test_a_script_that_its_workers_would_run_again_is_told_what_is_missing(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import json; from grasp_ros.maps.plan import Plan; from grasp_ros.maps.run import run\n"
+        f"run(Plan.from_document(json.loads({json.dumps(small_plan().to_document())!r})), 'map.zarr', workers=1)\n")
+    ended = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, check=False)
+    last = ended.stderr.splitlines()[-1]
+    assert "Refused: workers 1: do not start: " in last
+    assert last.endswith('allowed: fewer, and in a script the call below `if __name__ == "__main__":`')
+    assert not (tmp_path / "map.zarr").exists()
 
 
 @pytest.mark.slow
