@@ -97,10 +97,13 @@ def open_group(path: Path, mode: str = "r") -> Any:
     """The Zarr group of a map; what is none, or damaged, is refused."""
     import zarr
 
+    other = Refused(f"{path}: not a map; allowed: a new path, or what `grasp map` has written")
     with decoding(path, "a map", also=ZARR):
+        if not (path / "zarr.json").is_file():
+            raise other
         group = zarr.open_group(path, mode=mode, zarr_format=3)  # version 2 has arrays that are code
         if group.attrs.get("format") != FORMAT:
-            raise Refused(f"{path}: not a map; allowed: a new path, or what `grasp map` has written")
+            raise other
         missing = [name for name in (*_columns(group), *_axes(group)) if not (path / name / "zarr.json").is_file()]
         missing += ["versions"] if not isinstance(group.attrs.get("versions"), dict) else []
         if not missing:

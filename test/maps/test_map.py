@@ -255,7 +255,8 @@ def test_what_is_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "directory").mkdir()
     (tmp_path / "directory" / "mine").write_text("mine")
     for path, asked, words in (
-        (tmp_path / "text", plan, "not a map"), (tmp_path / "directory", plan, "not a map"),
+        (tmp_path / "text", plan, "not a map; allowed: a new path"),
+        (tmp_path / "directory", plan, "not a map; allowed: a new path"),
         (tmp_path / "old.zarr", plan, r"a map that was made with numpy 1\.0, not .*; allowed: a new path, or a map of"),
         (tmp_path / "map.zarr", other, r"a map of another plan \(setup\); allowed: a new path"),
         (tmp_path / "nowhere" / "\0", plan, "cannot be written|not a map|null byte"),
