@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,8 @@ class Store:
         self._lines = plan.rows // plan.shape[0]
         if not path.exists():
             try:
-                _create(path, plan, wanted, max(1, rows // self._lines))
+                with ThreadPoolExecutor(1) as pool:  # a Ctrl-C waits for it: what zarr still writes cannot be removed
+                    pool.submit(_create, path, plan, wanted, max(1, rows // self._lines)).result()
             except Refused:
                 if not path.exists():  # otherwise another process has made it meanwhile
                     raise

@@ -155,6 +155,18 @@ def test_threads_that_begin_the_same_map_make_one(tmp_path: Path, tiny_chunks: N
 
 
 @pytest.mark.slow
+def test_a_ctrl_c_while_a_map_is_created_leaves_nothing_behind(tmp_path: Path) -> None:
+    for trial in range(5):
+        (there := tmp_path / str(trial)).mkdir()
+        words = ["case_01", "--set", SHORT, "--x", f"{GAIN}=1:9:4", "--outcome", "extremes", "-o", there / "map.zarr"]
+        process = subprocess.Popen([sys.executable, "-m", "grasp_ros.cli", "map", *words], stderr=subprocess.PIPE)
+        wait_for(lambda there=there: any(there.iterdir()), "the first file")  # type: ignore[misc]
+        process.send_signal(signal.SIGINT)
+        assert process.communicate()[1].decode().splitlines()[-1] == "grasp: interrupted"
+        assert not list(there.glob(".*"))
+
+
+@pytest.mark.slow
 def test_a_map_that_was_killed_while_it_was_created_is_begun_again(tmp_path: Path) -> None:
     path, plan = tmp_path / "there" / "map.zarr", small_plan()
     path.parent.mkdir()
