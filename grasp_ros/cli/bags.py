@@ -66,7 +66,8 @@ def keeps(recording: Recording, options: argparse.Namespace) -> bool:
 def _recover(options: argparse.Namespace) -> int:
     from grasp_ros.graph.bag.recover import recover
 
-    new = options.output or options.bag.parent / f"{options.bag.stem}_recovered"
+    bag = options.bag if options.bag.name else options.bag.resolve()  # "." has no name
+    new = options.output or bag.parent / f"{bag.name if bag.is_dir() else bag.stem}_recovered"
     found = recover(options.bag, new)
     for words in found.left_out:
         print(f"left out: {words}")

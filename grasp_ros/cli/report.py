@@ -149,6 +149,7 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
         ("energy balance", f"{found['alarms']} alarms" if found["alarms"] else closes),
         ("lost", ", ".join(missing) or "nothing"),
         ("end", found["end"]),
+        *((name.replace("_", " "), found[name]) for name in ("recovered_from", "what_was_left_out") if name in found),
         ("recorded with", ", ".join(f"{name} {version}" for name, version in found["recorded_with"].items())
          or "not said"),
     ]

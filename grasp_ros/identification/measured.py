@@ -107,7 +107,9 @@ def _of_recording(recording: Recording, by_sensors: bool) -> Measured:
     if not recording.whole:
         why = f"resets: {recording.resets}" if recording.resets else "not all ticks of its run"
         raise Refused(f"{name}: {why}; allowed: a bag of one run from its begin, with all of its ticks")
-    others = [side for side, answers in answers_of(recording).items() if answers.differs]
+    answers = answers_of(recording)
+    others = [side for side, found in answers.items() if found.differs]
+    silent = [found.topic for found in answers.values() if not found.commands]
     why_unknown = ""
     if recording.changes:
         why_unknown = "numbers were set while it ran"
@@ -115,6 +117,8 @@ def _of_recording(recording: Recording, by_sensors: bool) -> Measured:
         why_unknown = "commands came by the wall clock"
     elif others:
         why_unknown = f"another law acted on the {' and the '.join(others)} arm"
+    elif silent:
+        why_unknown = f"no message on {' and '.join(silent)} says which law acted"
     state = recording.measured if by_sensors else recording.state
     return Measured(name, recording.scene, recording.t, state, recording.inputs[:-1], True, why_unknown)
 

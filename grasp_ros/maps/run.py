@@ -96,8 +96,12 @@ def connect(workers: int, scheduler: str) -> Any:
         ensure_running()  # by itself it would start later, and let a Ctrl-C through to the workers
         before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])  # a Ctrl-C is for us: workers end with us
         try:
-            options = {"dashboard_address": None, "silence_logs": logging.CRITICAL}  # workers that end are no error
-            return Client(n_workers=workers, threads_per_worker=1, **options)
+            return Client(
+                n_workers=workers, threads_per_worker=1, silence_logs=logging.CRITICAL,  # workers that end are no error
+                dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False})  # 0: a free port, of HTTP alone
+        except (OSError, RuntimeError) as error:
+            raise Refused(f"workers {workers}: do not start: {error}; allowed: fewer, and in a script the call below"
+                          ' `if __name__ == "__main__":`') from None
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
     try:

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +41,7 @@ class Store:
         self._lines = plan.rows // plan.shape[0]
         if not path.exists():
             try:
-                _create(path, plan, wanted, max(1, rows // self._lines))
+                _to_its_end(_create, path, plan, wanted, max(1, rows // self._lines))
             except Refused:
                 if not path.exists():  # otherwise another process has made it meanwhile
                     raise
@@ -66,9 +68,15 @@ class Store:
         try:
             with writing(self.path), zarr.config.set(ALL_FILES):
                 for name, values in {**chunk.columns, STATUS: chunk.status}.items():
-                    self._group[name][part] = values.reshape(-1, *self.plan.shape[1:])
+                    _to_its_end(self._group[name].__setitem__, part, values.reshape(-1, *self.plan.shape[1:]))
         except Refused as error:
             raise Refused(f"{error}; results are kept: the same command resumes") from None
+
+
+def _to_its_end(write: Callable[..., object], *arguments: object) -> None:
+    """Write in a thread, for whose end a Ctrl-C waits: zarr would go on in a thread of its own."""
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(write, *arguments).result()
 
 
 def _create(path: Path, plan: Plan, document: dict[str, Any], height: int) -> None:
@@ -97,10 +105,13 @@ def open_group(path: Path, mode: str = "r") -> Any:
     """The Zarr group of a map; what is none, or damaged, is refused."""
     import zarr
 
+    other = Refused(f"{path}: not a map; allowed: a new path, or what `grasp map` has written")
     with decoding(path, "a map", also=ZARR):
+        if not (path / "zarr.json").is_file():
+            raise other
         group = zarr.open_group(path, mode=mode, zarr_format=3)  # version 2 has arrays that are code
         if group.attrs.get("format") != FORMAT:
-            raise Refused(f"{path}: not a map; allowed: a new path, or what `grasp map` has written")
+            raise other
         missing = [name for name in (*_columns(group), *_axes(group)) if not (path / name / "zarr.json").is_file()]
         missing += ["versions"] if not isinstance(group.attrs.get("versions"), dict) else []
         if not missing:

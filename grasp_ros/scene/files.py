@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import struct
+import threading
 import zlib
 from collections.abc import Collection, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -84,7 +85,7 @@ def replacing(path: object) -> Iterator[BinaryIO]:
 @contextmanager
 def replaced(path: Path) -> Iterator[Path]:
     """The name of a file or a directory, with the same ending, that takes the place of another when it is whole."""
-    part = path.with_name(f".{path.stem[:200]}.{os.getpid()}.part{path.suffix}")
+    part = path.with_name(f".{path.stem[:200]}.{threading.get_native_id()}.part{path.suffix}")
     with writing(path):
         try:
             yield part

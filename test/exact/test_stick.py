@@ -1,17 +1,17 @@
-"""Bounds that prove that a stuck object does not slip in a Taylor step, against the impacts at many places of it."""
+"""Bounds that prove that a stuck object does not slip in a Taylor step, or that a sliding one does not stop."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from grasp_ros.exact.automaton.friction import apply_friction, stays_stuck
+from grasp_ros.exact.automaton.friction import apply_friction, lift_friction, slide_in_contact, stays_stuck
 from grasp_ros.exact.contact.step_unit import higher_order, new_settings
 from grasp_ros.exact.contact.taylor_step import press
 from grasp_ros.exact.driver.workspace import new_workspace
 from grasp_ros.exact.numerics.polynomial import curvatures, values
 from grasp_ros.exact.records import Array, Plant, State, Tables
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of, Pair, Slide, V, Work, Z
+from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Of, Pair, Slide, V, Work, Z
 from grasp_ros.physics.model import Contact, impact_force
 
 TOLERANCE, ORDER, DRAWS, PLACES = 1e-16, 34, 400, 100
@@ -68,3 +68,21 @@ def test_an_object_is_held_by_bounds_where_no_impact_overcomes_the_friction(part
         assert holds(100.0 * push + 1e3)
         proved += holds(1.3 * push)
     assert proved > DRAWS * (0.9 if part < 1.0 else 0.1)
+
+
+@pytest.mark.parametrize("slide", [Slide.RIGHTWARD, Slide.LEFTWARD])
+def test_an_object_that_moves_against_the_mode_of_its_friction_stops_at_once(slide: Slide) -> None:
+    random, turned, work = np.random.default_rng(5), 0, np.zeros(len(Work), dtype=np.int64)
+    sign = 1.0 if slide == Slide.RIGHTWARD else -1.0
+    for _ in range(DRAWS):
+        plant, state = held(random)
+        state.mode[OBJECT], state.y[V.O] = slide, -1e-17 * sign  # a rounding: it has stopped a little too late
+        lift_friction(plant)
+        apply_friction(plant, state.mode)
+        tables = new_workspace(ORDER).tables
+        segment = press(tables, plant, state, new_settings(TOLERANCE, higher_order(ORDER), plant.given), np.inf, work)
+        if sign * tables.c[LANES + V.O] < 0.0:
+            stop = slide_in_contact(tables, plant, state, segment.step.order.number, segment.s, work)
+            assert stop.when < 1e-15 * segment.s
+            turned += 1
+    assert turned > 0.2 * DRAWS

@@ -64,6 +64,15 @@ def test_contacts_at_the_begin_count_again_after_a_reset(tmp_path: Path) -> None
     assert (summary(late)["begin_s"], summary(late)["duration_s"]) == pytest.approx((0.01, 0.091))
 
 
+def test_more_messages_than_the_recorder_has_written_are_none_that_are_lost(tmp_path: Path) -> None:
+    recorder.write(tmp_path / "bag", simulate(scenes.load("case_01", ["time.duration_s=0.05"]), sampled=True))
+    (tmp_path / "bag" / "link").symlink_to("nowhere")  # has no size
+    once = bag.read(tmp_path / "bag")
+    more = replace(once, counts={**once.counts, "/diagnostics": 8})
+    assert once.lost["messages written"] == str(sum(once.counts.values()))
+    assert [summary(each)["missing"] for each in (once, more)] == [{}, {}]
+
+
 def test_limits_of_a_free_run_are_none_of_lockstep(recorded: tuple[Path, Trajectory], command: Any) -> None:
     found = command("inspect", str(recorded[0]), "--max-age", "3")
     assert (found.returncode, found.stdout) == (2, "")

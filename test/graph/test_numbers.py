@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from rosbags.typesys import Stores, get_typestore
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.recover import recover
+from grasp_ros.graph.bag.rosbag2 import text_message
 from grasp_ros.graph.bag.summary import summary
 from grasp_ros.graph.bag.verify import verify
 from grasp_ros.graph.running import Running
@@ -178,6 +180,20 @@ def test_a_tick_that_cannot_be_true_is_refused_and_left_out_of_what_is_recovered
     assert bag.read(tmp_path / "new").tick.tolist() == [tick for tick in range(11) if tick != 5]
 
 
+@pytest.mark.parametrize(("value", "why"), [(np.nan, "/left/effort_command: a number is not finite"), (1.0, "")])
+def test_a_command_of_a_free_run_that_cannot_be_read_is_left_out(tmp_path: Path, value: float, why: str) -> None:
+    """The recovered bag had it, too, and could not be read."""
+    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
+    ticks = list(study.ticks_of(run))
+    there = dict(ticks[5][1])
+    ticks[5] = ticks[5][0], [*{**there, LEFT_COMMAND: changed(
+        LEFT_COMMAND, there[LEFT_COMMAND], "wrench.force.x", value)}.items()]
+    written(tmp_path / "bag", run.scene, ticks, running=Running(real_time_factor=1.0))
+    found = recover(tmp_path / "bag", tmp_path / "new")
+    assert [left.startswith(f"parts of 1 ticks, the first 5: {why}") for left in found.left_out] == [True] * bool(why)
+    assert len(bag.read(tmp_path / "new").held["left"]) == 11 - bool(why)
+
+
 @pytest.mark.parametrize("name", LYAPUNOV_NAMES)
 @pytest.mark.parametrize("value", [1e9, np.nan])
 def test_every_number_of_the_monitor_is_verified(tmp_path: Path, name: str, value: float) -> None:
@@ -229,13 +245,17 @@ def test_a_bag_with_a_reset_may_be_written_anew(tmp_path: Path) -> None:
     assert (found.resets, verify(found).ticks, verify(found).problem) == (1, 22, "")
 
 
-@pytest.mark.parametrize("times", [(0, 1, 1), (0, 2, 1), (0, 1, 0.5)])
-def test_ticks_that_are_none_are_refused(tmp_path: Path, times: tuple[float, ...]) -> None:
+@pytest.mark.parametrize(("times", "why"), [
+    ((0, 1, 1), ": a second message of this tick; allowed: one"),
+    ((0, 2, 1), "; allowed: ticks of the scene in their order"),
+    ((0, 1, 0.5), "; allowed: ticks of the scene in their order"),
+])
+def test_ticks_that_are_none_are_refused(tmp_path: Path, times: tuple[float, ...], why: str) -> None:
     run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
     _, messages = next(study.ticks_of(run))
     written(tmp_path / "bag", run.scene, [(round(time * run.scene.period_ns), messages, 0) for time in times])
     wrong = round(times[-1] * run.scene.period_ns)
-    with pytest.raises(bag.BagError, match=f": {wrong} ns; allowed: ticks of the scene in their order"):
+    with pytest.raises(bag.BagError, match=f": {wrong} ns{why}"):
         bag.read(tmp_path / "bag")
 
 
@@ -245,10 +265,22 @@ def test_a_message_that_is_twice_in_a_tick_is_refused_and_of_two_the_last_is_rec
     topic, cdr = next((topic, cdr) for topic, cdr in ticks[5][1] if topic == LEFT_CONTACT)
     ticks[5][1].insert(0, (topic, changed(topic, cdr, "wrench.force.x", 9.0)))
     written(tmp_path / "bag", run.scene, ticks)
-    with pytest.raises(bag.BagError, match=r"contact/left: 5000000 ns; allowed: ticks of the scene in their order"):
+    with pytest.raises(bag.BagError, match=r"contact/left: 5000000 ns: a second message of this tick; allowed: one"):
         bag.read(tmp_path / "bag")
-    assert recover(tmp_path / "bag", tmp_path / "new").left_out == []
+    left_out = recover(tmp_path / "bag", tmp_path / "new").left_out
+    assert left_out == ["messages on /contact/left before another one of their tick: 1"]
     assert verify(bag.read(tmp_path / "new")).ticks == 11
+
+
+def test_another_scene_is_refused_and_said_to_be_left_out(tmp_path: Path) -> None:
+    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
+    ticks = list(study.ticks_of(run))
+    ticks[5][1].append((SCENE, text_message(scenes.load("case_02").to_yaml())))
+    written(tmp_path / "bag", run.scene, ticks)
+    why = f"{tmp_path / 'bag'}: /scene: another scene than in the bag's own record"
+    with pytest.raises(bag.BagError, match=re.escape(why)):
+        bag.read(tmp_path / "bag")
+    assert recover(tmp_path / "bag", tmp_path / "new").left_out == [f"parts of 1 ticks, the first 5: {why}"]
 
 
 def test_what_lies_beside_a_tick_that_is_lost_is_said_to_be_left_out(tmp_path: Path) -> None:

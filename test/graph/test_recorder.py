@@ -204,9 +204,25 @@ def test_a_recovered_bag_is_one_for_other_readers(tmp_path: Path, closed: Path, 
         assert reader.message_count == 7 * ticks + 2
         assert sum(1 for _ in reader.messages()) == 7 * ticks + 2
     assert {entry.name for entry in path.iterdir()} == {"bag.mcap"}
+    shown = command("inspect", "killed_recovered").stdout
+    assert "\nrecovered from           killed\nwhat was left out        " in shown
+    assert " on: the rest of a record is missing\n" in shown
     again = command("recover", "killed")
     assert again.returncode == 2
     assert "killed_recovered: already exists; allowed: a new directory" in again.stderr
+
+
+@pytest.mark.parametrize(("name", "new"), [("p_0.1", "p_0.1_recovered"), (".", "../here_recovered"),
+                                          ("bag.mcap", "bag_recovered"), ("\udcff", "\udcff_recovered")])
+def test_a_recovered_bag_lies_beside_the_old_one(
+    tmp_path: Path, closed: Path, command: Any, monkeypatch: pytest.MonkeyPatch, name: str, new: str
+) -> None:
+    for directory in ("p_0.1", "\udcff"):  # the second one is not UTF-8
+        shutil.copytree(closed, tmp_path / "here" / directory)
+    shutil.copy(storage(closed), tmp_path / "here")
+    monkeypatch.chdir(tmp_path / "here")
+    assert command("recover", name).returncode == 0
+    assert Path(new, "metadata.yaml").is_file()
 
 
 def test_a_second_bag_behind_the_first_is_named(tmp_path: Path, closed: Path, run: Trajectory) -> None:

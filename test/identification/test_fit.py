@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from graphs import rewritten
 
 from grasp_ros import compose, fit, load, read_bag, simulate
 from grasp_ros.graph.processes import Graph
@@ -21,6 +22,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
+from lab.drills import recorder
 
 H_LEFT, H_RIGHT = "left_contact.hertz_N_per_m1_5", "right_contact.hertz_N_per_m1_5"
 P_LEFT, P_RIGHT = "left_contact.dissipation_s_per_m", "right_contact.dissipation_s_per_m"
@@ -348,6 +350,15 @@ def test_the_law_of_another_controller_has_no_numbers() -> None:
     assert fit(run, [P_LEFT], SCENE.changed({P_LEFT: 0.2})).estimates == pytest.approx([0.1], rel=1e-9)
     with pytest.raises(Refused, match=r"^run: other controllers acted; allowed: inputs at every tick"):
         fit(run, [P_LEFT, "right_feedback.velocity_gain_Ns_per_m"])
+
+
+def test_a_bag_without_commands_does_not_say_which_law_acted(held: Trajectory, tmp_path: Path) -> None:
+    """The law of the scene was taken for granted: gains that somebody had set came out between the two values."""
+    recorder.write(tmp_path / "bag", held)
+    rewritten(tmp_path / "bag" / "bag.mcap", tmp_path / "new.mcap", without={"/left/effort_command": 0})
+    assert fit(tmp_path / "new.mcap", [P_LEFT]).estimates == pytest.approx([0.1], rel=1e-9)
+    with pytest.raises(Refused, match=r"new\.mcap: no message on left/effort_command says which law acted; allowed: i"):
+        fit(tmp_path / "new.mcap", ["left_feedback.velocity_gain_Ns_per_m"])
 
 
 def test_recorded_inputs_keep_their_times(held: Trajectory) -> None:

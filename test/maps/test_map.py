@@ -8,9 +8,12 @@ import re
 import resource
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import partial, reduce
 from operator import getitem
 from pathlib import Path
@@ -141,6 +144,28 @@ def test_it_goes_on_after_a_kill_and_computes_only_the_rest(
 compute = runs.compute
 
 
+def test_threads_that_begin_the_same_map_make_one(tmp_path: Path, tiny_chunks: None) -> None:
+    together, plan = tmp_path / "together.zarr", small_plan()
+    with ThreadPoolExecutor(3) as pool:
+        for begun in [pool.submit(run, plan, together) for _ in range(3)]:
+            begun.result()
+    run(plan, tmp_path / "alone.zarr")
+    assert_same(together, tmp_path / "alone.zarr")
+    assert {path.name for path in tmp_path.iterdir()} == {"together.zarr", "alone.zarr"}
+
+
+@pytest.mark.slow
+def test_a_ctrl_c_while_a_map_is_created_leaves_nothing_behind(tmp_path: Path) -> None:
+    for trial in range(5):
+        (there := tmp_path / str(trial)).mkdir()
+        words = ["case_01", "--set", SHORT, "--x", f"{GAIN}=1:9:4", "--outcome", "extremes", "-o", there / "map.zarr"]
+        process = subprocess.Popen([sys.executable, "-m", "grasp_ros.cli", "map", *words], stderr=subprocess.PIPE)
+        wait_for(lambda there=there: any(there.iterdir()), "the first file")  # type: ignore[misc]
+        process.send_signal(signal.SIGINT)
+        assert process.communicate()[1].decode().splitlines()[-1] == "grasp: interrupted"
+        assert not list(there.glob(".*"))
+
+
 @pytest.mark.slow
 def test_a_map_that_was_killed_while_it_was_created_is_begun_again(tmp_path: Path) -> None:
     path, plan = tmp_path / "there" / "map.zarr", small_plan()
@@ -242,7 +267,8 @@ def test_what_is_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "directory").mkdir()
     (tmp_path / "directory" / "mine").write_text("mine")
     for path, asked, words in (
-        (tmp_path / "text", plan, "not a map"), (tmp_path / "directory", plan, "not a map"),
+        (tmp_path / "text", plan, "not a map; allowed: a new path"),
+        (tmp_path / "directory", plan, "not a map; allowed: a new path"),
         (tmp_path / "old.zarr", plan, r"a map that was made with numpy 1\.0, not .*; allowed: a new path, or a map of"),
         (tmp_path / "map.zarr", other, r"a map of another plan \(setup\); allowed: a new path"),
         (tmp_path / "nowhere" / "\0", plan, "cannot be written|not a map|null byte"),
@@ -295,6 +321,30 @@ def test_a_worker_that_dies_takes_no_row_with_it(tmp_path: Path, tiny_chunks: No
         assert len(set(client.run(os.getpid).values()) - set(workers.values())) <= 1
     assert reached == list(range(61))
     assert_same(tmp_path / "cluster.zarr", tmp_path / "alone.zarr")
+
+
+@pytest.mark.slow
+def test_workers_start_beside_another_cluster(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    with socket.socket() as other:
+        with suppress(OSError):  # another one is there
+            other.bind(("127.0.0.1", 8787))
+            other.listen()
+        run(small_plan(), tmp_path / "map.zarr", workers=1)
+    assert not [each for each in recwarn if "8787" in str(each.message)]
+    assert (read(tmp_path / "map.zarr")["status"].values == STATUSES.index("REFUSED")).sum() == 24
+
+
+@pytest.mark.slow
+def test_a_script_that_its_workers_would_run_again_is_told_what_is_missing(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import json; from grasp_ros.maps.plan import Plan; from grasp_ros.maps.run import run\n"
+        f"run(Plan.from_document(json.loads({json.dumps(small_plan().to_document())!r})), 'map.zarr', workers=1)\n")
+    ended = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, check=False)
+    last = ended.stderr.splitlines()[-1]
+    assert "Refused: workers 1: do not start: " in last
+    assert last.endswith('allowed: fewer, and in a script the call below `if __name__ == "__main__":`')
+    assert not (tmp_path / "map.zarr").exists()
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from graphs import rewritten
 from processes import DEADLINE, START, wait_for
 
 from grasp_ros import scene as scenes
@@ -147,6 +148,10 @@ def test_words_of_a_stranger_do_nothing_to_a_terminal(tmp_path: Path, command: A
     result = command("inspect", "bag")
     assert result.returncode == 0
     assert "\\x1b[31m3" in result.stdout
+    assert "\x1b" not in result.stdout
+    rewritten(tmp_path / "bag" / "bag.mcap", tmp_path / "new.mcap", beside="/\x1b[2J")
+    result = command("recover", "new.mcap")
+    assert "left out: messages on /\\x1b[2J, no topic of its scene: " in result.stdout
     assert "\x1b" not in result.stdout
 
 

@@ -214,7 +214,7 @@ def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: floa
     slide, row, c = state.mode[OBJECT], tables.row, tables.c
     if slide != Slide.STUCK:
         low, high = lane_range(c, tables.size, V.O, h, tables.at[V.O])
-        if min(c[V.O], low) > 0.0 or max(c[V.O], high) < 0.0:
+        if (c[V.O] > 0.0 and low > 0.0) if slide == Slide.RIGHTWARD else (c[V.O] < 0.0 and high < 0.0):
             return Candidate(math.inf, Slide.STUCK)
         factor = -1.0 if slide == Slide.RIGHTWARD else 1.0
         for k in range(n + 1):

@@ -78,11 +78,11 @@ def begin_interval(plant: Plant, state: State, out: Output) -> None:
     if plant.coulomb > 0.0:
         settle_object(plant, state, out)
     for _ in range(2):  # a pair that is pushed back may push the other one back, too
-        if mode[LEFT] != Pair.LEAVING and mode[RIGHT] != Pair.LEAVING:
-            return
         left, right = mode_at_tick(plant, state, LEFT), mode_at_tick(plant, state, RIGHT)
-        settle(state, LEFT, left, out)
-        settle(state, RIGHT, right, out)
+        if left != mode[LEFT]:
+            settle(state, LEFT, left, out)
+        if right != mode[RIGHT]:
+            settle(state, RIGHT, right, out)
 
 
 @inlined

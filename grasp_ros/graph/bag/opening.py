@@ -85,7 +85,7 @@ class Opened:
                 again = Storage(self.storage.path, salvage).messages()
                 if any(after.time_ns < before.time_ns for before, after in pairwise(again)):  # topic by topic, say
                     everything = sorted(everything, key=attrgetter("time_ns"))
-            self.foreign: Counter[str] = Counter()  # messages by topic that a bag which is salvaged leaves out
+            self.left_out: Counter[str] = Counter()  # messages that a bag which is salvaged is left without, by reason
             self.messages = self._known(everything)  # each with its topic
             # Topics whose messages are as they came, not one for each tick: those of commands in a free run.
             self.held: Collection[Topic] = () if self.running.lockstep else self.scene.controllers.values()
@@ -97,7 +97,7 @@ class Opened:
                 if topic := known.get((stored.topic, stored.type)):
                     yield topic, stored
                 elif self.salvage:
-                    self.foreign[stored.topic] += 1
+                    self.left_out[f"messages on {stored.topic}, no topic of its scene"] += 1
                 else:
                     raise BagError(f"{self.path}: {stored.topic}: {stored.type} is not a topic of its scene;"
                                    " `grasp recover` leaves it out")

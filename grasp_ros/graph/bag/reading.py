@@ -53,7 +53,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
 def _recording(opened: Opened) -> Recording:
     scene, reader, changes, timing = opened.scene, Ticks(opened), Changes(opened.scene), list[Sequence[float]]()
     quality = () if opened.running.lockstep else timing_names(NAMES[body] for body in scene.system.laws)
-    held, own = {topic: array("d") for topic in opened.held}, opened.storage.records[OWN_RECORD]
+    held = {topic: array("d") for topic in opened.held}
     counts = Counter(dict.fromkeys(opened.names, 0))
     stamps, rows = array("q"), array("d")
     for time_ns, tick, others in ticks_of(opened, reader.topics):
@@ -64,11 +64,9 @@ def _recording(opened: Opened) -> Recording:
             elif topic == topics.TIMING:
                 timing.extend(_timing(quality, stored))
             elif topic in held:  # a command of a free run, which belongs to no tick
-                held[topic].append(reader.numbers(topic, stored.cdr)[-1])
-                if not abs(held[topic][-1]) <= LARGEST:
-                    raise BagError(f"{stored.topic}: {NOT_FINITE}")
-            elif topic in (topics.SCENE, topics.RUN) and decode(topic, stored.cdr).data != own[topic.name]:
-                raise BagError(f"{opened.path}: {stored.topic}: another {topic.name} than in the bag's own record")
+                held[topic].append(reader.force(topic, stored))
+            else:
+                check_own(opened, topic, stored)
         row = reader.row(time_ns, tick) if tick else []
         if topics.JOINT_STATES in tick:
             stamps.extend((time_ns, reader.stamp_ns))
@@ -118,10 +116,20 @@ def ticks_of(
             if topic not in wanted:
                 others.append((topic, stored))
                 continue
-            if topic in tick and not opened.salvage:
-                raise BagError(f"{stored.topic}: {time_ns} ns; {IN_ORDER}")
+            if topic in tick:
+                if not opened.salvage:
+                    raise BagError(f"{stored.topic}: {time_ns} ns: a second message of this tick; allowed: one")
+                opened.left_out[f"messages on {stored.topic} before another one of their tick"] += 1
             tick[topic] = stored.cdr
         yield time_ns, tick, others
+
+
+def check_own(opened: Opened, topic: Topic, stored: Stored) -> None:
+    """Refuse a scene, or how it ran, that is not that of the bag's own record."""
+    if topic in (topics.SCENE, topics.RUN):
+        own = opened.storage.records[OWN_RECORD][topic.name]
+        if decode(topic, stored.cdr).data != own:
+            raise BagError(f"{opened.path}: {stored.topic}: another {topic.name} than in the bag's own record")
 
 
 def _with_our_times(opened: Opened, wanted: Container[Topic]) -> Iterator[tuple[Topic, Stored]]:
@@ -210,6 +218,13 @@ class Ticks:
     def numbers(self, topic: Topic, cdr: bytes) -> Sequence[float]:
         """Seconds, nanoseconds and numbers of a message."""
         return self._templates[topic].read(cdr) or self._decoded(topic, cdr)
+
+    def force(self, topic: Topic, stored: Stored) -> float:
+        """Force of a command of a free run."""
+        force = self.numbers(topic, stored.cdr)[-1]
+        if not abs(force) <= LARGEST:
+            raise BagError(f"{stored.topic}: {NOT_FINITE}")
+        return force
 
     def _decoded(self, topic: Topic, cdr: bytes) -> list[float]:
         """Time and numbers of a message of another program, in the order of those of a recorder."""

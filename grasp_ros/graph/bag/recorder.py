@@ -42,6 +42,7 @@ OWN_RECORD, LOST_RECORD = "grasp_ros", "grasp_ros/lost"
 LIBRARY = "grasp_ros-"  # how the name of what has written a bag begins
 # Counted in LOST_RECORD: all that is in the bag, and what came between the states and was too much.
 WRITTEN, NOT_RECORDED = "messages written", "messages not recorded"
+SOURCE, LEFT_OUT = "recovered from", "what was left out"  # of a bag that was recovered
 VERSION = "version "  # how the keys of versions begin
 DIGEST, METADATA_DIGEST = "digest", "digest of metadata.yaml"  # keys of checksums in these records
 

@@ -189,7 +189,7 @@ class Recording(Tabular, Frozen):
     def size(self) -> int:
         """Bytes of the bag on the disk."""
         files = self.path.iterdir() if self.path.is_dir() else [self.path]
-        return sum(file.stat().st_size for file in files)
+        return sum(file.stat().st_size for file in files if file.is_file())
 
     @property
     def rates(self) -> dict[str, float]:
@@ -278,7 +278,7 @@ class Recording(Tabular, Frozen):
         ticks = max(int(self.tick.max(initial=-1)) + 1, *(self.counts[name] for name in every_tick))
         there = sum(self.counts.values())
         others = {NOT_RECORDED: int(self.lost.get(NOT_RECORDED, 0)),
-                  WRITTEN: int(self.lost.get(WRITTEN, there)) - there}
+                  WRITTEN: max(int(self.lost.get(WRITTEN, there)) - there, 0)}
         return {**{name: ticks - self.counts[name] for name in every_tick}, **self.unheard,
                 **{name: number for name, number in others.items() if number}}
 

@@ -9,8 +9,9 @@ from typing import NamedTuple
 
 from grasp_ros.graph.bag import BagError
 from grasp_ros.graph.bag.opening import UNREADABLE, Opened
-from grasp_ros.graph.bag.reading import Changes, Ticks, ticks_of
-from grasp_ros.graph.bag.recorder import Recorder
+from grasp_ros.graph.bag.reading import Changes, Ticks, check_own, ticks_of
+from grasp_ros.graph.bag.recorder import LEFT_OUT, SOURCE, Recorder
+from grasp_ros.physics.errors import printable
 from grasp_ros.scene.topics import CHANGES, CLOCK, RUN, SCENE
 
 MOST_REASONS = 20  # that are listed
@@ -56,21 +57,25 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
             recorder.write_tick(time_ns, tick.items(), reader.stamp_ns)
             written += 1
             for topic, stored in others:
-                if topic in (SCENE, RUN, CLOCK):  # which the recorder writes itself
-                    continue
                 try:
+                    check_own(opened, topic, stored)
                     if topic in CHANGES.values():
                         changes.add(topic, stored)
+                    elif topic in opened.held:
+                        reader.force(topic, stored)
                 except UNREADABLE as error:
                     note(error, number)
                     continue
-                recorder.write(topic, stored.cdr)
+                if topic not in (SCENE, RUN, CLOCK):  # which the recorder writes itself
+                    recorder.write(topic, stored.cdr)
     finally:
         left_out = [f"{size} bytes from byte {offset} on: {why}" for offset, size, why in opened.storage.left_out]
-        left_out += [f"messages on {name}, no topic of its scene: {count}" for name, count in opened.foreign.items()]
+        left_out += [f"{why}: {count}" for why, count in opened.left_out.items()]
         left_out += [f"parts of {len(at)} ticks, the first {at[0]}: {why}" for why, at in refused.items()]
+        left_out = [*map(printable, left_out)]  # names of topics, say, which may be anything
         if recorder is not None:
-            recorder.close({"recovered from": str(opened.path), "what was left out": "; ".join(left_out) or "none"})
+            source, lost = printable(str(opened.path)), "; ".join(left_out) or "none"
+            recorder.close({SOURCE: source, LEFT_OUT: lost})
     if recorder is None:
         reasons = (*(why for _, _, why in opened.storage.left_out), *refused, "it holds no tick")
         raise BagError(f"{opened.path}: nothing can be recovered: {reasons[0]}")

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from grasp_ros.graph.bag.recorder import LEFT_OUT, SOURCE
 from grasp_ros.graph.bag.recording import Recording, check_recording
 from grasp_ros.graph.bag.verify import Verification
 from grasp_ros.physics.model import Mode
@@ -34,6 +35,7 @@ def summary(recording: Recording) -> dict[str, Any]:
         "changes": [{"tick": tick, "time_s": scene.time_of(tick), **numbers}
                     for tick, numbers in recording.changes.items()],
         **_levels(recording),
+        **{name.replace(" ", "_"): recording.lost[name] for name in (SOURCE, LEFT_OUT) if name in recording.lost},
     }
     if not running.lockstep:
         found["real_time_factor"] = running.real_time_factor
