@@ -15,7 +15,7 @@ from grasp_ros.exact.contact.series import expand_force
 from grasp_ros.exact.flight.closed_form import fly, launch
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.kinematics import bound_by, next_derivative, own_acceleration, rate_lanes, rates_of
-from grasp_ros.exact.numerics.polynomial import lane_range, product
+from grasp_ros.exact.numerics.polynomial import lane_bounds, product
 from grasp_ros.exact.numerics.roots import first_rise, shift, value_and_rate
 from grasp_ros.exact.records import Array, Flight, Integers, Regime
 from grasp_ros.observe.record import LOWER, POSITION, QUANTITIES, UPPER, VELOCITY, Quantity, Seen, SegmentRecord, Wanted
@@ -85,10 +85,9 @@ def in_flight(segment: SegmentRecord, q: int) -> tuple[float, float]:
 
 
 @inlined
-def lane_bounds(segment: SegmentRecord, lane: int, at: float) -> tuple[float, float]:
+def bounds_in_step(segment: SegmentRecord, lane: int, at: float) -> tuple[float, float]:
     """Bounds of a lane in a Taylor step that ends at the value `at`."""
-    low, high = lane_range(segment.m.c, segment.m.size, lane, segment.s, at)
-    return min(segment.m.c[lane], low), max(segment.m.c[lane], high)
+    return lane_bounds(segment.m.c, segment.m.size, lane, segment.s, at)
 
 
 @inlined
@@ -111,12 +110,12 @@ def flight_ranges(segment: SegmentRecord, low: Array, high: Array) -> None:
 @inlined
 def step_ranges(segment: SegmentRecord, low: Array, high: Array) -> None:
     """Bounds on all quantities but the inputs in a Taylor step; those of an impact only while there is one."""
-    low[X.O], high[X.O] = lane_bounds(segment, X.O, segment.m.y[X.O])
+    low[X.O], high[X.O] = bounds_in_step(segment, X.O, segment.m.y[X.O])
     for lane in (V.L, V.O, V.R):
-        low[lane], high[lane] = lane_bounds(segment, lane, segment.m.y[lane])
+        low[lane], high[lane] = bounds_in_step(segment, lane, segment.m.y[lane])
     for side in (LEFT, RIGHT):
         u, touches = segment.m.y[U.L + side], segment.m.mode[side] == Pair.CONTACT
-        least, most = lane_bounds(segment, Z.L + side, math.sqrt(max(u, 0.0)) if touches else u)
+        least, most = bounds_in_step(segment, Z.L + side, math.sqrt(max(u, 0.0)) if touches else u)
         low[U.L + side], high[U.L + side] = least, most
         if touches:  # w = sqrt(u)
             low[U.L + side], high[U.L + side] = max(least, 0.0) * max(least, 0.0), most * most

@@ -13,7 +13,7 @@ from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.contact.series import expand_force
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.kinematics import approach, rate_lanes
-from grasp_ros.exact.numerics.polynomial import lane_range, values
+from grasp_ros.exact.numerics.polynomial import lane_bounds, values
 from grasp_ros.exact.numerics.roots import first_rise, value_and_rate
 from grasp_ros.exact.records import Array, Candidate, Integers, Plant, Push, State, Tables
 from grasp_ros.exact.tolerances import FRICTION, SLIDES
@@ -126,12 +126,11 @@ def impact_range(tables: Tables, plant: Plant, side: Body, h: float) -> tuple[fl
     The ranges of the lanes give them, and `size` is what their roundings are a part of.
     """
     c, size, at, (front, back), z = tables.c, tables.size, tables.at, rate_lanes(side), Z.L + side
-    (low, high), (slow, fast) = lane_range(c, size, z, h, at[z]), lane_range(c, size, front, h, at[front])
-    still, moving = lane_range(c, size, back, h, at[back])
-    low, high = max(min(low, c[z]), 0.0), max(high, c[z])
-    slow, fast = min(slow, c[front]) - max(moving, c[back]), max(fast, c[front]) - min(still, c[back])
+    (low, high), (slow, fast) = lane_bounds(c, size, z, h, at[z]), lane_bounds(c, size, front, h, at[front])
+    still, moving = lane_bounds(c, size, back, h, at[back])
+    slow, fast, root = slow - moving, fast - still, max(low, 0.0)
     hertzian, loss = plant.pairs[side, Law.HERTZIAN], plant.pairs[side, Law.DISSIPATION]
-    weak, strong = elastic_force(hertzian, low * low), elastic_force(hertzian, high * high)
+    weak, strong = elastic_force(hertzian, root * root), elastic_force(hertzian, high * high)
     return (weak * max(damping_factor(loss, slow), 0.0), strong * max(damping_factor(loss, fast), 0.0),
             strong * damping_factor(loss, max(abs(slow), abs(fast))))
 
@@ -143,14 +142,14 @@ def stays_stuck(tables: Tables, plant: Plant, mode: Integers, h: float) -> bool:
     `tables.at` holds the values at its end h.
     """
     push = plant.given[OBJECT, Of.FORCE]
-    left, right, rounding = push, push, still_noise(plant)
+    least, most, rounding = push, push, still_noise(plant)
     for side in (LEFT, RIGHT):
         if mode[side] == Pair.CONTACT:
             low, high, size = impact_range(tables, plant, side, h)
-            left += low if side == LEFT else -high
-            right += high if side == LEFT else -low
+            least += low if side == LEFT else -high
+            most += high if side == LEFT else -low
             rounding += FRICTION * size
-    return max(-left, right) + rounding < plant.coulomb
+    return max(-least, most) + rounding < plant.coulomb
 
 
 @inlined
@@ -213,8 +212,8 @@ def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: floa
     """
     slide, row, c = state.mode[OBJECT], tables.row, tables.c
     if slide != Slide.STUCK:
-        low, high = lane_range(c, tables.size, V.O, h, tables.at[V.O])
-        if (c[V.O] > 0.0 and low > 0.0) if slide == Slide.RIGHTWARD else (c[V.O] < 0.0 and high < 0.0):
+        low, high = lane_bounds(c, tables.size, V.O, h, tables.at[V.O])
+        if low > 0.0 if slide == Slide.RIGHTWARD else high < 0.0:
             return Candidate(math.inf, Slide.STUCK)
         factor = -1.0 if slide == Slide.RIGHTWARD else 1.0
         for k in range(n + 1):

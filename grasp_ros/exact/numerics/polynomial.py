@@ -61,6 +61,13 @@ def lane_range(c: Array, size: Array, lane: int, s: float, end: float) -> tuple[
 
 
 @inlined
+def lane_bounds(c: Array, size: Array, lane: int, s: float, end: float) -> tuple[float, float]:
+    """The least and the largest value that a lane may have in [0, s], by its range."""
+    low, high = lane_range(c, size, lane, s, end)
+    return min(c[lane], low), max(c[lane], high)
+
+
+@inlined
 def invert_time(c: Array, at: Array, step: Step, tau: float, high: float, total: float) -> float:
     """The s / unit in [0, high] at which the time since the begin of a step is tau; `total` is the time at high.
 
