@@ -121,6 +121,6 @@ def write(docs: Path, found: dict[str, str]) -> Path:
     for name, table in found.items():
         mark = f"<!-- {name} -->"
         before, _, after = text.split(mark)
-        text = f"{before}{mark}\n\n{table}\n\n{mark}{after}"
+        text = f"{before}{mark}\n\n{table}\n\n{pages.stamp()}\n\n{mark}{after}"
     pages.put(page, text)
     return page
