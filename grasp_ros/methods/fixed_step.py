@@ -179,7 +179,10 @@ def deliver(linear: bool, y: Any, f: Any, z: Any, g: Any, t: float, reached: flo
 
 @allocating
 def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out: Any, events: Any, work: Any) -> Any:
-    """All steps; returns the outcome and how many rows of `out` and of `events` are filled."""
+    """All steps; returns the outcome and how many rows of `out` and of `events` are filled.
+
+    The outcome is a number: Python code makes an enum of it, and a signal that has come meanwhile raises in that code.
+    """
     row, found, number, idle, t = 0, 0, 0, 0, 0.0
     mode, free = np.zeros(2, dtype=np.int64), np.ones(2, dtype=np.bool_)
     changed = np.full(2, -1.0)  # time of the last event
