@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -67,10 +67,13 @@ class Store:
         part = slice(span[0] // self._lines, span[1] // self._lines)
         try:
             with writing(self.path), zarr.config.set(ALL_FILES):
-                for name, values in {**chunk.columns, STATUS: chunk.status}.items():
-                    _to_its_end(self._group[name].__setitem__, part, values.reshape(-1, *self.plan.shape[1:]))
+                _to_its_end(self._fill, part, {**chunk.columns, STATUS: chunk.status})
         except Refused as error:
             raise Refused(f"{error}; results are kept: the same command resumes") from None
+
+    def _fill(self, part: slice, columns: Mapping[str, np.ndarray]) -> None:
+        for name, values in columns.items():
+            self._group[name][part] = values.reshape(-1, *self.plan.shape[1:])
 
 
 def _to_its_end(write: Callable[..., object], *arguments: object) -> None:

@@ -249,6 +249,7 @@ def test_a_pair_that_turns_back_leaves_out_no_contact(side: Body, hertzian: floa
 @SIDES
 def test_nothing_moves_a_pair_that_only_another_one_will_press(side: Body) -> None:
     assert force_free_time(np.zeros(HIGHEST + 1), *bench(side, 0.0, 0.0, Pair.BEGINNING)[:2], side) == math.inf
+    assert force_free_time(np.zeros(HIGHEST + 1), *bench(side, 0.0, 0.3, Pair.CONTACT)[:2], side) == math.inf
 
 
 # The impulse that a pair leaves out.

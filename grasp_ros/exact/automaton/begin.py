@@ -32,15 +32,15 @@ def must_begin(state: State, side: Body) -> bool:
     return bool(joint or approach(y, side) == 0.0)
 
 
-@kernel
+@inlined
 def force_free_time(f: Array, plant: Plant, state: State, side: Body) -> float:
-    """Time in s, a power of two, for which a pair that is BEGINNING may fly without its force.
+    """Time in s, a power of two, for which a pair at u = 0 that begins may fly without its force.
 
     The search multiplies a tiny time until the force neglected is too large or u' changes its sign: until then the
-    force is largest at the end. inf if nothing moves it. The series of u is left in f.
+    force is largest at the end. inf if not BEGINNING or not moved. The series of u is left in f.
     """
     y = state.y
-    if write_own_series(plant, y, side, f) == 0.0:
+    if state.mode[side] != Pair.BEGINNING or write_own_series(plant, y, side, f) == 0.0:
         return math.inf
     longest, speed = min(short_time(plant, side), LONGEST), speed_of_pair(y, side)
     time = power_of_two(exponent(longest) - MOST_HALVINGS)

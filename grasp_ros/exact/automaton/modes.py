@@ -61,7 +61,10 @@ def initial_slide(plant: Plant, state: State) -> None:
 
 @inlined
 def begin_interval(plant: Plant, state: State, out: Output) -> None:
-    """Set the modes under the inputs of a new interval, or the first of a run; a resumed interval keeps them."""
+    """Set the modes under the inputs of a new interval, or the first of a run; a resumed interval keeps them.
+
+    What would change nothing is not called: handing over the records takes longer than the flight of a tick.
+    """
     mode = state.mode
     lift_friction(plant)
     if mode[LEFT] == Pair.UNKNOWN:

@@ -101,8 +101,7 @@ def flight_ends(row: Array, plant: Plant, state: State, segment: Segment, work: 
         return Ends(left, right, slide, math.nan)
     known = min(segment.t, left.when, right.when, slide.when, known_l, known_r)
     for side in (LEFT, RIGHT):
-        if state.mode[side] == Pair.BEGINNING:
-            known = min(known, force_free_time(row, plant, state, side))
+        known = min(known, force_free_time(row, plant, state, side))
     return Ends(left, right, slide, known)
 
 
