@@ -11,7 +11,7 @@ import subprocess
 import time
 from functools import partial
 
-from grasp_ros.graph.host import LOCALHOST, RANGE, SUBNET
+from grasp_ros.graph.host import LOCALHOST, PROFILE, RANGE, SUBNET
 from grasp_ros.scene.topics import JOINT_STATES
 from lab.drills.faults.drill import Drill, Skipped
 from lab.drills.faults.stage import START_SECONDS, Stage
@@ -81,7 +81,7 @@ def peer(stage: Stage) -> Evidence:
     inside = build(stage)
     stage.look_on_from(on(inside["two"], ROS_STATIC_PEERS=f"{LINK}.1"))
     found = {}
-    for name, more in (("theirs", {WISH: "none"}), ("ours", {})):
+    for name, more in (("theirs", {WISH: str(PROFILE)}), ("ours", {})):
         stage.node("plant", prefix=on(inside["one"], **{RANGE: LOCALHOST, **more}))
         stage.wait(lambda: stage.said("waiting"), START_SECONDS)
         topic = JOINT_STATES.name
