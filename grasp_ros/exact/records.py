@@ -286,7 +286,7 @@ class Ends(NamedTuple):
     left: Candidate
     right: Candidate
     slide: Candidate
-    known: float  # end; s, or s of a Taylor step
+    end: float  # of the segment; s, or s of a Taylor step
 
 
 class Level(NamedTuple):

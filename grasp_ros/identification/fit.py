@@ -59,7 +59,7 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
     seen = {key: float(found.state[0, place]) for place, key in enumerate(INITIAL) if place in found.channels}
     begun = found.scene.changed({key: seen[key] for key in free if key in seen} if found.t[0] == 0.0 else {})
     numbers = numbers_of(begun, free, found)
-    if any(acts(number.key) for number in numbers):
+    if any(acts(begun, number.key) for number in numbers):
         found = found._replace(inputs=None)
     if found.inputs is None and found.why_unknown:
         raise Refused(f"{found.name}: {found.why_unknown}; allowed: inputs at every tick, and no free parameter of"

@@ -13,7 +13,6 @@ from grasp_ros.physics.errors import Refused, allowed
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import BY_SECTION
-from grasp_ros.scene.effects.force import FORCED
 from grasp_ros.sensitivity.directions import check_key
 
 OFFSET = "offset."  # of a sensor; the name of its channel follows
@@ -72,10 +71,10 @@ def numbers_of(scene: Scene, keys: Sequence[str], data: Measured) -> tuple[Numbe
     return found
 
 
-def acts(key: str) -> bool:
-    """Whether a number, or a section, decides what acts from outside: that of a controller, or an external force."""
-    section = key.partition(".")[0]
-    return section in FORCED or (section in BY_SECTION and BY_SECTION[section].node != "plant")
+def acts(scene: Scene, key: str) -> bool:
+    """Whether a number or section decides what acts from outside: that of a controller, or of an external force."""
+    section, forced = key.partition(".")[0], {force.section for force in scene.system.external}
+    return section in forced or (section in BY_SECTION and BY_SECTION[section].node != "plant")
 
 
 def _offset(key: str, data: Measured) -> Number:

@@ -201,7 +201,7 @@ def motion(data: Measured, scene: Scene, keys: Sequence[str], rows: int) -> tupl
         if (ticks := int(tick_of(scene, times[-1:])[0]) + 1) < scene.ticks:
             scene = scene.changed({"time.duration_s": scene.time_of(ticks)})
     else:  # all that acts from outside is known: of the scene bodies and contacts are left
-        kept = [section for section in scene.values if not acts(section) and section != "loop"]
+        kept = [section for section in scene.values if not acts(scene, section) and section != "loop"]
         scene = compose(scene.name, {section: scene.values[section] for section in kept})
     integrator = Integrator(scene.system, continuous=not data.sampled, max_work=WORK + WORK_OF_TICK * scene.ticks)
     carrier = Carrier(scene, integrator, directions(scene, keys, data.sampled), times, data.sampled)

@@ -13,7 +13,7 @@ from grasp_ros.exact.driver.callback import reader
 from grasp_ros.exact.records import Array, Integers, Plant, State, new_run
 from grasp_ros.physics.accuracy import FINEST
 
-QUANTITIES = 12
+QUANTITIES = 12  # STATES, and those of `Quantity`
 STATES = 8
 COUNTS = 4
 POSITION, VELOCITY = 0, 1  # columns of gains
@@ -49,17 +49,17 @@ class Seen(IntEnum):
     LOW = 0  # of the quantities
     HIGH = QUANTITIES
     DAMPERS = 2 * QUANTITIES  # energy taken, J
-    FEEDBACK = 25
-    FRICTION = 26
-    IMPACTS = 27
-    WORK = 28  # of held commands and external forces, J
-    LEVEL = 29  # V_c, J
-    LEAST = 30  # of V_c so far
-    RISE = 31  # largest V_c less the least before it
-    OUTSIDE = 32  # of each body: last time outside the bound, s; inf: when the last segment ended
-    BOUND = 35  # m
-    SETTLED = 36  # time from which on no body leaves the bound, s; inf: not within the run; nan: V_c cannot tell
-    LAST_OUTSIDE = 37  # OUTSIDE of each body at the end of the run, s; a run that goes on until it settles keeps it
+    FEEDBACK = DAMPERS + 1
+    FRICTION = DAMPERS + 2
+    IMPACTS = DAMPERS + 3
+    WORK = DAMPERS + 4  # of held commands and external forces, J
+    LEVEL = DAMPERS + 5  # V_c, J
+    LEAST = DAMPERS + 6  # of V_c so far
+    RISE = DAMPERS + 7  # largest V_c less the least before it
+    OUTSIDE = DAMPERS + 8  # of each body: last time outside the bound, s; inf: when the last segment ended
+    BOUND = DAMPERS + 11  # m
+    SETTLED = DAMPERS + 12  # time from which on no body leaves the bound, s; inf: not in the run; nan: V_c cannot tell
+    LAST_OUTSIDE = DAMPERS + 13  # OUTSIDE of each body at the end of the run, s, also where the run goes on to settle
 
 
 SEEN = Seen.LAST_OUTSIDE + 3

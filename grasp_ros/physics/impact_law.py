@@ -4,9 +4,9 @@
 
 u > 0 is penetration, u' > 0 approach, H in N/m^1.5, p in s/m. All but `energy_quotient` take floats or NumPy arrays,
 and `exact.impact` compiles their source for the kernels. `model.impact_force` combines them for any u and u'.
-Another exponent changes this file, powers of w in `exact.contact.series` and `sensitivity.contact`, and the key of
-H with its unit in `domain`, `scene.effects.contact` and `scene.effects.base`; and, for speed alone, a power of w in
-`exact.contact.step_unit.turning_rate`. Tests: docs/oracles.md.
+Another exponent, a multiple of 1/2, changes this file; products in `exact.contact.series` and `sensitivity.contact`;
+which powers of t are whole in `exact.automaton.edge.coming_push`; in `exact.contact` the terms of `motion_sizes` and,
+for speed alone, `turning_rate`; and the key of H in `domain`, `scene.effects` and all scenes. Tests: docs/oracles.md.
 
 References
 ----------

@@ -30,6 +30,7 @@ PAIR_COLUMNS: dict[int, tuple[int, int]] = {LEFT: (0, 2), RIGHT: (2, 4)}  # of t
 class ExternalForce(NamedTuple):
     """A force on one body, constant over each control period."""
 
+    section: str  # of the scene, to which it belongs
     body: int
     at: Callable[[NDArray[np.int64]], Array]  # ticks (n,) to N (n,), from each of them to the next
     changes: Callable[[int], Sequence[int]]  # ascending ticks of the run, in (0, n), at which it may change, from n

@@ -20,7 +20,6 @@ from grasp_ros.physics.system import PAIR_COLUMNS, System
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import build
 from grasp_ros.scene.effects.base import SIDES, Parameter
-from grasp_ros.scene.effects.force import FORCED
 from grasp_ros.scene.places import parameter_of, place_of
 
 NOT_SMOOTH = {  # by the unit of a number: why no derivative is to be had
@@ -69,7 +68,7 @@ def directions(scene: Scene, keys: Sequence[str], sampled: bool) -> Directions:
         See `check_keys`.
     """
     parameters = check_keys(scene, keys, sampled)
-    forced = any(key.partition(".")[0] in FORCED for key in keys)
+    forced = {force.section for force in scene.system.external} & {key.partition(".")[0] for key in keys}
     found = no_directions(len(keys), scene.ticks if forced else 0)
     for j, (key, parameter) in enumerate(zip(keys, parameters, strict=True)):
         if place := place_of(scene, key):

@@ -7,7 +7,7 @@ import pytest
 
 from grasp_ros.exact.automaton.friction import apply_friction, lift_friction, slide_in_contact, stays_stuck
 from grasp_ros.exact.contact.step_unit import higher_order, new_settings
-from grasp_ros.exact.contact.taylor_step import press
+from grasp_ros.exact.contact.taylor_step import take_step
 from grasp_ros.exact.driver.workspace import new_workspace
 from grasp_ros.exact.numerics.polynomial import curvatures, values
 from grasp_ros.exact.records import Array, Plant, State, Tables
@@ -54,7 +54,7 @@ def test_an_object_is_held_by_bounds_where_no_impact_overcomes_the_friction(part
         plant, state = held(random)
         settings = new_settings(TOLERANCE, higher_order(ORDER), plant.given)
         tables = new_workspace(ORDER).tables
-        segment = press(tables, plant, state, settings, np.inf, work)
+        segment = take_step(tables, plant, state, settings, np.inf, work)
         n, h = segment.step.order.number, part * segment.s
         push = largest_push(tables, plant, state, n, h)
 
@@ -80,7 +80,8 @@ def test_an_object_that_moves_against_the_mode_of_its_friction_stops_at_once(sli
         lift_friction(plant)
         apply_friction(plant, state.mode)
         tables = new_workspace(ORDER).tables
-        segment = press(tables, plant, state, new_settings(TOLERANCE, higher_order(ORDER), plant.given), np.inf, work)
+        settings = new_settings(TOLERANCE, higher_order(ORDER), plant.given)
+        segment = take_step(tables, plant, state, settings, np.inf, work)
         if sign * tables.c[LANES + V.O] < 0.0:
             stop = slide_in_contact(tables, plant, state, segment.step.order.number, segment.s, work)
             assert stop.when < 1e-15 * segment.s

@@ -23,6 +23,7 @@ from lab.reference.grasp import system_of
 STEPPING = [name for name in METHODS if name != EXACT]
 LOCATING = [name for name in STEPPING if METHODS[name].events]
 PRECISE = {STEP: 2e-5, "tolerance": 1e-11}
+LESS_PRECISE = {"paper": 2e-5, "discrete_gradient": 2e-5}  # error at that setting, of methods of a low order
 
 
 @pytest.mark.parametrize("name", STEPPING)
@@ -33,7 +34,7 @@ def test_methods_agree_with_exact_for_some_contacts(name: str) -> None:
     exact = simulate(scene)
     assert motion.status is Status.DONE
     assert motion.method == name
-    assert np.abs(motion.state - exact.state).max() < (2e-5 if "discrete" in name or name == "paper" else 1e-6)
+    assert np.abs(motion.state - exact.state).max() < LESS_PRECISE.get(name, 1e-6)
     assert motion.work[0] > 100
     if name in LOCATING:
         for side in (LEFT, RIGHT):

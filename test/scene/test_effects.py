@@ -109,6 +109,12 @@ def test_every_effect_has_its_row_in_the_cost_table() -> None:
         assert simulate(scene.changed({"time.duration_s": 0.1})).status is Status.DONE
 
 
+def test_an_external_force_names_the_section_of_its_effect() -> None:
+    for section, scene in variants(scenes.load("case_01", ["time.duration_s=1.0"])).items():
+        if section in BY_SECTION:
+            assert {force.section for force in scene.system.external} <= {section}
+
+
 def test_the_reference_lists_every_effect_and_key() -> None:
     page = scene_keys()
     for effect in EFFECTS:

@@ -18,7 +18,7 @@ PERIOD, KILOGRAMS = 0.25, 2.0
 
 def free_arm(delay: int) -> System:
     """An arm of 2 kg without a spring, pushed by 10 N from tick 1 on."""
-    system = System(delay=delay, external=[ExternalForce(LEFT, lambda ticks: 10.0 * (ticks > 0), lambda _: [1])])
+    system = System(delay=delay, external=[ExternalForce("", LEFT, lambda ticks: 10.0 * (ticks > 0), lambda _: [1])])
     system.bodies[LEFT, Of.MASS] = KILOGRAMS
     return system
 

@@ -65,10 +65,10 @@ def deciding_derivative(plant: Plant, state: State, side: Body) -> Deciding:
 
 @kernel
 def coming_push(plant: Plant, state: State, beside: Body) -> Deciding:
-    """The first derivative of u of the other pair that a pair without a force yet moves.
+    """The first derivative of u of a pair that the force of the pair `beside` moves, which has no force yet.
 
     The force of a pair that closes from u = 0 like t^n grows like t^(3 n / 2), that of a pair at u' = -1/p like
-    u' + 1/p. It moves u of the other pair with two powers more. Where that power is not whole the value is inf.
+    u' + 1/p. It moves u of this pair with two powers more. Without a derivative of that order to add to, it is inf.
     """
     y, mode, pair, mass = state.y, state.mode[beside], plant.pairs[beside], plant.bodies[OBJECT, Of.MASS]
     if mode not in (Pair.CONTACT, Pair.BEGINNING):

@@ -130,7 +130,7 @@ def cut_step(tables: Tables, plant: Plant, state: State, segment: Segment, ends:
 
     The values at its end, and the changes of the lanes, are left in `tables.at`.
     """
-    c, at, step, s = tables.c, tables.at, segment.step, ends.known
+    c, at, step, s = tables.c, tables.at, segment.step, ends.end
     if math.isnan(s):
         return Segment(segment.kind, math.nan, math.nan, step, segment.flights)
     if s < segment.s or state.mode[OBJECT] != Slide.FREE:  # the search for a slip leaves another state in `at`

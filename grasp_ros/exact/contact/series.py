@@ -9,7 +9,7 @@ touch and release, and w simply crosses zero at release. Its Taylor coefficients
 only nonlinear operation is the product of two series (Cauchy product), so one step is one loop over the order.
 The coefficients are also the dense output, and bounds on them prove where an event function has no root.
 
-With g = w^4, or w_l^4 w_r, the impulse of (6) per 2 ds is H g (1 + p u'). An order waits only for the newest
+With g = H w^4, or H w_l^4 w_r, the impulse of (6) per 2 ds is g (1 + p u'). An order waits only for the newest
 coefficients of the velocities, and they pass through one product; w, u = w^2 and g are known one order ahead.
 """
 
@@ -96,9 +96,9 @@ def scale_of(unit: float) -> float:
 def expand_one(c: Array, f: Array, bodies: Array, pairs: Array, side: int, unit: float, n: int) -> None:
     """Fill the Taylor table c from its order 0, with one side in contact: G = w. The series are in s / unit.
 
-    Products: w v_o, w u' of the open side, w a_l, w a_r, w a_o, w w, u u, H g (1 + p u'). Their terms with coefficients
-    0 and 1 are added here: a term of two such coefficients occurs once, so a constant that multiplies the newest
-    coefficient is set after its own order.
+    Products: w v_o, w u' of the open side, w a_l, w a_r, w a_o, w w, u u, g (1 + p u'). Their terms with coefficients 0
+    and 1 are added here. The term of a coefficient with itself occurs once, all others twice: so the constants that
+    multiply the newest coefficients are set, or doubled, after the order of that term.
     """
     hertzian, loss = pairs[side, Law.HERTZIAN], pairs[side, Law.DISSIPATION]
     left, middle, right = per_mass(bodies[LEFT]), per_mass(bodies[OBJECT]), per_mass(bodies[RIGHT])
@@ -155,7 +155,7 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
     underflow.
 
     Products: G v_o, G a_l, G a_r, G a_o, w_l w_r, w_r u_l', w_l u_r'; then for each side w w, u u, w^4 w of the other
-    side, H g (1 + p u'). The sum of w_l w_r has the same roundings in a mirrored grasp.
+    side, g (1 + p u'). The sum of w_l w_r has the same roundings in a mirrored grasp.
     """
     hertz_l, loss_l = pairs[LEFT, Law.HERTZIAN], pairs[LEFT, Law.DISSIPATION]
     hertz_r, loss_r = pairs[RIGHT, Law.HERTZIAN], pairs[RIGHT, Law.DISSIPATION]
@@ -174,7 +174,7 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
         u_l, u_r = fma(w_end_l, w_l, u_l), fma(w_end_r, w_r, u_r)
         q_l, q_r = fma(u_end_l, u_l, q_l), fma(u_end_r, u_r, q_r)
         g_l, g_r = hertz_l * fma(q_l, b[2], fma(a[7], s_r, g_l)), hertz_r * fma(q_r, b[1], fma(a[8], s_l, g_r))
-        g = ww + (w_l * b[2] + a[6] * s_r)
+        ww += w_l * b[2] + a[6] * s_r
         one = 1.0 if k == 0 else 0.0
         a_l, a_o, a_r = accelerations((left, middle, right), one, x_o, (u_l, u_r), (v_l, v_o, v_r))
         d_l, d_r = v_l - v_o, v_o - v_r
@@ -182,23 +182,23 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
         # The impact law (6) per 2 ds, of each side: H w^4 (1 + p u') times the other side's w.
         z_l, z_r = fma(e_l, b[3], fma(a[9], g_l, z_l)), fma(e_r, b[4], fma(a[10], g_r, z_r))
         wd_l, wd_r = fma(d_l, b[2], fma(a[4], s_r, wd_l)), fma(d_r, b[1], fma(a[5], s_l, wd_r))
-        gv, gl = fma(v_o, b[0], fma(a[0], g, gv)), fma(a_l, b[0], fma(a[1], g, gl))
-        gr, go = fma(a_r, b[0], fma(a[2], g, gr)), fma(a_o, b[0], fma(a[3], g, go))
+        gv, gl = fma(v_o, b[0], fma(a[0], ww, gv)), fma(a_l, b[0], fma(a[1], ww, gl))
+        gr, go = fma(a_r, b[0], fma(a[2], ww, gr)), fma(a_o, b[0], fma(a[3], ww, go))
         store_eight(f, FACTORS * k, (v_o, a_l, a_r, a_o, d_l, d_r, w_l, 0.0))
         store_eight(f, FACTORS * k + 8, (w_l, w_r, u_l, u_r, q_l, q_r, e_l, e_r))
-        store_eight(f, FACTORS * k + SECOND, (g, g, g, g, s_r, s_l, s_r, 0.0))
+        store_eight(f, FACTORS * k + SECOND, (ww, ww, ww, ww, s_r, s_l, s_r, 0.0))
         store_eight(f, FACTORS * k + SECOND + 8, (w_l, w_r, u_l, u_r, s_r, s_l, g_l, g_r))
         if k == 0:
             a = (v_o, a_l, a_r, a_o, d_l, d_r, w_l, q_l, q_r, e_l, e_r)
             w_end_l, w_end_r, u_end_l, u_end_r = 2.0 * w_l, 2.0 * w_r, 2.0 * u_l, 2.0 * u_r
         step = unit / (k + 1)
         twice = 2.0 * step
-        c[LANES * k + Lane.CHECK] = g
+        c[LANES * k + Lane.CHECK] = ww
         w_l, w_r, x_o = step * wd_l, step * wd_r, twice * gv
         s_l, s_r = scale * w_l, scale * w_r
         v_l, v_r = twice * fma(-left[0], z_l, gl), twice * fma(right[0], z_r, gr)
         v_o = twice * fma(middle[0], z_l - z_r, go)
-        store_eight(c, LANES * (k + 1), (twice * g, v_l, x_o, v_o, 0.0, v_r, w_l, w_r))
+        store_eight(c, LANES * (k + 1), (twice * ww, v_l, x_o, v_o, 0.0, v_r, w_l, w_r))
 
 
 @kernel

@@ -31,7 +31,7 @@ MAX_UNITS, MOST_FITS = 200, 4
 
 @inlined
 def motion_sizes(c: Array, reach: float) -> Lanes:
-    """Sizes of what moves in each lane within `reach`: the largest of five terms."""
+    """Sizes of what moves in each lane within `reach`: the largest of the first TAIL terms, which are five."""
     square = reach * reach
     cube, fourth = square * reach, square * square
     low = larger(load(c, LANES) * reach, load(c, 2 * LANES) * square)
@@ -196,7 +196,7 @@ def accepted_length(tables: Tables, step: Step, h: float, settings: Settings, wo
 
 
 @inlined
-def press(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, work: Integers) -> Segment:
+def take_step(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, work: Integers) -> Segment:
     """One Taylor step as far as it is exact; its series and the values at its end stand in the tables."""
     work[Work.CONTACT_STEPS] += 1
     step, h = fitted_step(tables, plant, state, settings, new_step(plant, state, settings, span), span)

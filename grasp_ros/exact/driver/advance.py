@@ -14,7 +14,7 @@ from grasp_ros.exact.compensated import tick, until, write_penetrations
 from grasp_ros.exact.compilation.jit import door, inlined
 from grasp_ros.exact.contact.segment import cut_step, move_by_step, state_in_step, step_ends
 from grasp_ros.exact.contact.step_unit import new_settings, within_decay
-from grasp_ros.exact.contact.taylor_step import press
+from grasp_ros.exact.contact.taylor_step import take_step
 from grasp_ros.exact.driver.callback import REST, notify, tell
 from grasp_ros.exact.driver.energy_check import check_segment, energy_level
 from grasp_ros.exact.driver.intervals import answer_end, close_interval, enter_interval, open_interval, rest
@@ -48,12 +48,12 @@ def next_segment(tables: Tables, plant: Plant, state: State, settings: Settings,
     """The motion to its first event, to the end of the span, or as far as it is known; t: nan where a search fails."""
     if state.mode[LEFT] == Pair.CONTACT or state.mode[RIGHT] == Pair.CONTACT:
         span = within_decay(plant, state.mode, span)
-        segment = press(tables, plant, state, settings, span, work)
+        segment = take_step(tables, plant, state, settings, span, work)
         ends = step_ends(tables, plant, state, segment, work)
         return cut_step(tables, plant, state, segment, ends, span), ends
     segment = fly_free(plant, state, span, work)
     ends = flight_ends(tables.row, plant, state, segment, work)
-    return Segment(segment.kind, ends.known, ends.known, segment.step, segment.flights), ends
+    return Segment(segment.kind, ends.end, ends.end, segment.step, segment.flights), ends
 
 
 @inlined

@@ -90,7 +90,7 @@ def fly_free(plant: Plant, state: State, span: float, work: Integers) -> Segment
 
 @inlined
 def flight_ends(row: Array, plant: Plant, state: State, segment: Segment, work: Integers) -> Ends:
-    """First events of pairs and object in a flight, in s; `known` is also the end of a search or a begin.
+    """First events of pairs and object in a flight, in s; a search that gives up, or a begin, ends it, too.
 
     `row` is scratch.
     """

@@ -39,9 +39,9 @@ TABLE = (
 NEVER = "is not before the run's end: no force acts"
 
 
-def _add(section: str, force: ExternalForce, system: System) -> None:
+def _add(force: ExternalForce, system: System) -> None:
     system.external.append(force)
-    system.caveats.append(f"{section} does work")
+    system.caveats.append(f"{force.section} does work")
 
 
 def _build_steps(section: str, body: int, sections: Sections, system: System) -> None:
@@ -53,8 +53,8 @@ def _build_steps(section: str, body: int, sections: Sections, system: System) ->
         begin = nanoseconds(numbers["start_s"]) // period
         starts, forces = [begin, begin + nanoseconds(numbers["length_s"]) // period], (0.0, numbers["force_N"], 0.0)
     begins, values = np.array(starts), np.array(forces, dtype=float)
-    _add(section, ExternalForce(body, lambda ticks: values[np.searchsorted(begins, ticks, side="right")],
-                                lambda end: [tick for tick in starts if 0 < tick < end]), system)
+    _add(ExternalForce(section, body, lambda ticks: values[np.searchsorted(begins, ticks, side="right")],
+                       lambda end: [tick for tick in starts if 0 < tick < end]), system)
 
 
 def _build_sine(section: str, body: int, sections: Sections, system: System) -> None:
@@ -66,7 +66,7 @@ def _build_sine(section: str, body: int, sections: Sections, system: System) -> 
     def at(ticks: NDArray[np.int64]) -> Array:
         return np.array([numbers["amplitude_N"] * math.sin(turn * (tick + 0.5) + phase) for tick in ticks.tolist()])
 
-    _add(section, ExternalForce(body, at, lambda end: range(1, end)), system)
+    _add(ExternalForce(section, body, at, lambda end: range(1, end)), system)
 
 
 def _off_tick(keys: tuple[str, ...], section: str, sections: Sections) -> Iterable[str]:
@@ -139,4 +139,3 @@ def _effects(name: str, body: int) -> Iterable[Effect]:
 
 
 EFFECTS = tuple(effect for name, body in BODIES.items() for effect in _effects(name, body))
-FORCED = frozenset(effect.section for effect in EFFECTS)
