@@ -147,6 +147,13 @@ def test_a_closed_output_is_no_traceback(program: str) -> None:
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_failure_is_one_although_nobody_reads_of_it(unbuffered: str) -> None:
+    """A closed pipe made it a success."""
+    program = "$GRASP simulate case_01 --max-events 3 | true; exit ${PIPESTATUS[0]}"
+    assert shell(program, PYTHONUNBUFFERED=unbuffered).returncode == 1
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
 def test_a_file_is_written_although_nobody_reads_the_table(tmp_path: Path, unbuffered: str) -> None:
     path = tmp_path / "run.npz"
     result = shell(f"$GRASP simulate case_01 --set time.duration_s=1 -o {path} | true; exit ${{PIPESTATUS[0]}}",

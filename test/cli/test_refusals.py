@@ -32,6 +32,7 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "exits.py": b"import sys; sys.exit(0)", "breaks.py": b"raise BrokenPipeError",
         "words/journal.jsonl": b"not JSON\n", "bag/metadata.yaml": b"[" * 20_000,
         "there.npz/x": b"", "folder.yaml/x": b"", "no.mcap": b"x", "packed/x.db3.zstd": b"x", "x.mcap.zstd": b"x",
+        "split/0.mcap": b"x", "split/1.mcap": b"x",
     }.items():
         Path(name).parent.mkdir(exist_ok=True)
         Path(name).write_bytes(content)
@@ -74,6 +75,7 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("fit  --free object.mass_kg", "'' is not allowed; allowed: a name"),
         *((f"verify {name}", words) for name, words in (
             ("bag/metadata.yaml", "bag/metadata.yaml: the metadata of a bag; the bag is its directory, bag"),
+            ("split", "split: not a bag of this package: holds 2 .mcap files; allowed: one, as `rosbags-convert"),
             ("packed", "packed: its storage is sqlite3; allowed: MCAP, as `rosbags-convert"),
             ("packed/x.db3.zstd", "packed/x.db3.zstd: its storage is sqlite3; allowed: MCAP, as `rosbags-convert"),
             ("x.mcap.zstd", "x.mcap.zstd: its file is compressed as a whole; allowed: chunks, as `rosbags-convert"))),

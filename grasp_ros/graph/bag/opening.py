@@ -50,7 +50,8 @@ def _file_of(path: Path) -> Path:
         raise BagError(f"{path}: its storage is sqlite3; allowed: MCAP, {CONVERT}")
     if any(path.glob("*.mcap.*")) or path.suffix == PACKED:
         raise BagError(f"{path}: its file is compressed as a whole; allowed: chunks, {CONVERT}")
-    raise BagError(f"{path}: not {KIND}: holds {len(files)} .mcap files; allowed: one")
+    joined = f", {CONVERT}" if files else ""
+    raise BagError(f"{path}: not {KIND}: holds {len(files)} .mcap files; allowed: one{joined}")
 
 
 class Opened:
