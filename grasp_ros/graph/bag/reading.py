@@ -58,16 +58,19 @@ def _recording(opened: Opened) -> Recording:
     stamps, rows = array("q"), array("d")
     for time_ns, tick, others in ticks_of(opened, reader.topics):
         counts.update([*tick, *(topic for topic, _ in others)])
-        for topic, stored in others:
-            if topic in topics.CHANGES.values():
-                changes.add(topic, stored)
-            elif topic == topics.TIMING:
-                timing.extend(_timing(quality, stored))
-            elif topic in held:  # a command of a free run, which belongs to no tick
-                held[topic].append(reader.force(topic, stored))
-            else:
-                check_own(opened, topic, stored)
-        row = reader.row(time_ns, tick) if tick else []
+        try:
+            for topic, stored in others:
+                if topic in topics.CHANGES.values():
+                    changes.add(topic, stored)
+                elif topic == topics.TIMING:
+                    timing.extend(_timing(quality, stored))
+                elif topic in held:  # a command of a free run, which belongs to no tick
+                    held[topic].append(reader.force(topic, stored))
+                else:
+                    check_own(opened, topic, stored)
+            row = reader.row(time_ns, tick) if tick else []
+        except UNREADABLE as error:
+            raise BagError(f"{error or type(error).__name__}; `grasp recover` leaves it out") from None
         if topics.JOINT_STATES in tick:
             stamps.extend((time_ns, reader.stamp_ns))
             rows.extend(row)
