@@ -288,7 +288,7 @@ def _timing(names: Sequence[str], stored: Stored) -> Iterator[Sequence[float]]:
 def _lost(storage: Storage) -> dict[str, str]:
     """How the recording ended and what is missing, as the bag says it; without its word, what the reader has found."""
     if not storage.closed:
-        left_out = sum(size for _, size, _ in storage.left_out)
+        left_out = sum(size for _, size, _ in storage.unread)
         return {"end": f"not closed; {left_out} bytes behind the last whole chunk are left out"}
     anew = {"end": "written anew by another program, which does not say what was lost"}
     return {key: word for key, word in storage.records.get(LOST_RECORD, anew).items() if key != METADATA_DIGEST}
