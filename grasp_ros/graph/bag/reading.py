@@ -70,7 +70,7 @@ def _recording(opened: Opened) -> Recording:
                     check_own(opened, topic, stored)
             row = reader.row(time_ns, tick) if tick else []
         except UNREADABLE as error:
-            raise BagError(f"{error or type(error).__name__}; `grasp recover` leaves it out") from None
+            raise BagError(f"{opened.path}: {error or type(error).__name__}; `grasp recover` leaves it out") from None
         if topics.JOINT_STATES in tick:
             stamps.extend((time_ns, reader.stamp_ns))
             rows.extend(row)
@@ -132,7 +132,7 @@ def check_own(opened: Opened, topic: Topic, stored: Stored) -> None:
     if topic in (topics.SCENE, topics.RUN):
         own = opened.storage.records[OWN_RECORD][topic.name]
         if decode(topic, stored.cdr).data != own:
-            raise BagError(f"{opened.path}: {stored.topic}: another {topic.name} than in the bag's own record")
+            raise BagError(f"{stored.topic}: another {topic.name} than in the bag's own record")
 
 
 def _with_our_times(opened: Opened, wanted: Container[Topic]) -> Iterator[tuple[Topic, Stored]]:
