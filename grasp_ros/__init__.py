@@ -35,6 +35,10 @@ __all__ = sorted(_PLACES)
 
 def __getattr__(name: str) -> Any:
     """What is used for the first time."""
+    if name == "__version__":
+        from importlib.metadata import version  # which takes a while
+
+        return version(__name__)
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, _, there = _PLACES[name].partition(":")

@@ -27,3 +27,4 @@ __all__ = [
 ]
 
 CONFIG: Path
+__version__: str

@@ -50,11 +50,16 @@ def check_output(output: Path | None, endings: Collection[str], force: bool, inp
 def check_memory(scene: Scene, sampled: bool, grid: int | None = None) -> None:
     """Refuse more output times, or ticks of a sampled run, than memory holds, before the work."""
     ticks = scene.ticks if sampled or scene.sampled else 0
-    for name, rows in (("--grid", grid or 0), (f"{scene.name}: time.duration_s / control_period_s", ticks)):
-        try:
-            np.empty((rows, ROW))
-        except (MemoryError, ValueError):  # the second: more than any array can have
-            raise Refused(f"{name}: {rows} is not allowed; allowed: as many as fit into memory") from None
+    check_fits("--grid", grid or 0, ROW)
+    check_fits(f"{scene.name}: time.duration_s / control_period_s", ticks, ROW)
+
+
+def check_fits(name: str, rows: int, numbers: int) -> None:
+    """Refuse more rows of so many numbers than memory holds."""
+    try:
+        np.empty((rows, numbers))
+    except (MemoryError, ValueError):  # the second: more than any array can have
+        raise Refused(f"{name}: {rows} is not allowed; allowed: as many as fit into memory") from None
 
 
 def prepare() -> None:

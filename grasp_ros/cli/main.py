@@ -61,6 +61,7 @@ def run(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str]) -> 
     if isinstance(getattr(sys.stdout, "buffer", None), io.FileIO):  # unbuffered: drops what cannot be written at once
         own = sys.stdout
         sys.stdout = open(own.fileno(), "w", 1, own.encoding, own.errors, closefd=False)  # noqa: SIM115 - likewise
+    status = 0
     try:
         status = _status(parser, words)
         sys.stdout.flush()  # here, where it can still be said that it failed
@@ -77,7 +78,7 @@ def run(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str]) -> 
         nothing = os.open(os.devnull, os.O_WRONLY)
         for stream in (sys.stdout, sys.stderr):
             os.dup2(nothing, stream.fileno())
-        return 0 if enough else 1
+        return status if enough else 1
 
 
 def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str]) -> int:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_json, add_scene, whole
-from grasp_ros.cli.checks import load_scene, prepare
+from grasp_ros.cli.checks import check_fits, load_scene, prepare
 from grasp_ros.cli.commands import COMMANDS
 from grasp_ros.cli.output import bar, note, show
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
@@ -78,6 +78,7 @@ def _map(options: argparse.Namespace) -> int:
     for path in pictures.values():
         if path.exists() and not options.output.exists():
             raise Refused(f"{path}: already exists; allowed: an output whose figures beside it are new")
+    check_fits(f"{scene.name}: runs", plan.rows, 2 * (len(axes) + len(columns)))  # in chunks, and joined
     prepare()
     with bar(plan.rows, "run", scene.name) as progress:
         run(plan, options.output, workers=options.workers, scheduler=options.scheduler, progress=progress)

@@ -109,7 +109,8 @@ def _motion(source: str, options: argparse.Namespace, span: Span) -> Motion:
         warn(motion.scene)
         return motion
     if path.is_file() and ending not in YAML:
-        raise Refused(f"{source}: no such scene; allowed: a scene, a bag, or a .npz file of `grasp simulate`")
+        raise Refused(f"{source}: no such scene; allowed: a scene, a bag (a directory, or .mcap), or a .npz file of"
+                      " `grasp simulate`")
     scene = load_scene(source, options.settings)
     check_memory(scene, options.sampled)
     prepare()

@@ -21,7 +21,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import BODIES, NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.files import decoding, reading
+from grasp_ros.scene.files import decoding, format_of, reading
 from grasp_ros.simulation.sampled_plant import tick_times
 from grasp_ros.simulation.tables import COLUMNS, HEADS, TIME
 from grasp_ros.simulation.trajectory import Trajectory
@@ -82,7 +82,7 @@ def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> M
         name = str(path)
         if directory or path.suffix.lower() == ".mcap":
             source = read(path)
-        elif path.suffix.lower() != ".csv":
+        elif format_of(path, (".mcap", ".npz", ".csv")) == ".npz":
             source = load(path)
     if by_sensors and not isinstance(source, Recording):
         raise Refused("measured by sensors: allowed: of a bag")

@@ -92,8 +92,10 @@ def text(name: str, value: Any) -> str:
 
 
 def path(name: str, value: Any) -> Path:
-    """A path, see `instance`."""
-    return Path(instance(name, value, (str, os.PathLike), "a path"))
+    """A path, see `instance`; no empty text, which would be the working directory."""
+    if instance(name, value, (str, os.PathLike), "a path") == "":
+        raise Refused(f"{name}: '' is not allowed; allowed: a path")
+    return Path(value)
 
 
 def mapping(name: str, values: Any) -> dict[Any, Any]:

@@ -61,7 +61,7 @@ def writing(path: object, refusal: type[Refused] = Refused) -> Iterator[None]:
 
 
 def format_of(path: str | os.PathLike[str], allowed: Collection[str]) -> str:
-    """The ending of a file that is to be written, in small letters: it decides the format."""
+    """The ending of a file, in small letters: it decides the format."""
     ending = given.path("path", path).suffix.lower()
     if ending not in allowed:
         wrong = f"{ending} is not allowed; allowed: " if ending else "needs an ending, one of "

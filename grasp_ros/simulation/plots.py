@@ -82,13 +82,13 @@ def compose(
     span: tuple[float, float] | None = None, panels: Sequence[Panel] | None = None,
 ) -> Figure:
     """The figure that `draw` writes; its panels are by default those of PANELS that are not empty."""
-    span = shown(motions, span)
     for motion in motions:
         if not len(instance("motion", motion, Tabular, A_MOTION).t) or motion.t[0] == motion.t[-1]:
             raise Refused("nothing to draw: the motion has fewer than two output times")
     captions = names("captions", [*map(_caption, motions)] if captions is None else captions)
     if not 0 < len(motions) == len(captions):
         raise Refused(f"captions: {len(captions)} for {len(motions)} motions; allowed: motions, a caption each")
+    span = shown(motions, span)
     usual = WIDTH_MM if len(motions) == 1 else 150.0 * len(motions)
     width = usual if width_mm is None else number("width_mm", width_mm)
     if width_mm is not None and not NARROWEST_MM <= width <= WIDEST_MM:
@@ -144,11 +144,13 @@ def end_of(motion: Motion) -> float:
 
 
 def shown(motions: Sequence[Motion], span: tuple[float, float] | None) -> tuple[float, float] | None:
-    """The first and the last time in s that are wanted, which the longest motion has; None: all."""
+    """The first and the last time in s that are wanted, where some motion is; None: all."""
     if span is None:
         return None
-    longest = max(end_of(instance("motion", motion, Tabular, A_MOTION)) for motion in motions)
-    first, last = ascending("span", rows("span", span, 2), longest, strictly=True).tolist()
+    first, last = ascending("span", rows("span", span, 2), max(map(end_of, motions)), strictly=True).tolist()
+    if not any(motion.t[0] < last and first < motion.t[-1] for motion in motions):
+        begin, end = min(motion.t[0] for motion in motions), max(motion.t[-1] for motion in motions)
+        raise Refused(f"nothing to draw from {first:g} to {last:g} s: the motion is from {begin:g} to {end:g} s")
     return first, last
 
 

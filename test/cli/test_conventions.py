@@ -63,6 +63,8 @@ def test_help_is_there_at_once() -> None:
         ("simulate case_01 --method rk5", "argument --method: rk5 is not allowed; did you mean rk45?"),
         ("simulate case_01 --set zzz.qqq=1", "no such key; allowed: time.duration_s, "),
         ("new", "the following arguments are required: FILE.yaml"),
+        ("map case_01 --x object.mass_kg=1:2 --x left_arm.mass_kg=1:2 -o a.zarr", "--x: given twice; allowed: once"),
+        ("simulate case_01 -o a.npz --output b.npz", "argument -o/--output: given twice; allowed: once"),
     ],
 )
 def test_a_refusal_is_short_and_says_what_was_meant(command: Any, words: str, complaint: str) -> None:
@@ -144,6 +146,13 @@ def test_a_closed_output_is_no_traceback(program: str) -> None:
     assert result.returncode == 0
     assert "Traceback" not in result.stderr
     assert "Exception" not in result.stderr
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_failure_is_one_although_nobody_reads_of_it(unbuffered: str) -> None:
+    """A closed pipe made it a success."""
+    program = "$GRASP simulate case_01 --max-events 3 | true; exit ${PIPESTATUS[0]}"
+    assert shell(program, PYTHONUNBUFFERED=unbuffered).returncode == 1
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])

@@ -32,6 +32,7 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "exits.py": b"import sys; sys.exit(0)", "breaks.py": b"raise BrokenPipeError",
         "words/journal.jsonl": b"not JSON\n", "bag/metadata.yaml": b"[" * 20_000,
         "there.npz/x": b"", "folder.yaml/x": b"", "no.mcap": b"x", "packed/x.db3.zstd": b"x", "x.mcap.zstd": b"x",
+        "split/0.mcap": b"x", "split/1.mcap": b"x",
     }.items():
         Path(name).parent.mkdir(exist_ok=True)
         Path(name).write_bytes(content)
@@ -74,6 +75,7 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("fit  --free object.mass_kg", "'' is not allowed; allowed: a name"),
         *((f"verify {name}", words) for name, words in (
             ("bag/metadata.yaml", "bag/metadata.yaml: the metadata of a bag; the bag is its directory, bag"),
+            ("split", "split: not a bag of this package: holds 2 .mcap files; allowed: one, as `rosbags-convert"),
             ("packed", "packed: its storage is sqlite3; allowed: MCAP, as `rosbags-convert"),
             ("packed/x.db3.zstd", "packed/x.db3.zstd: its storage is sqlite3; allowed: MCAP, as `rosbags-convert"),
             ("x.mcap.zstd", "x.mcap.zstd: its file is compressed as a whole; allowed: chunks, as `rosbags-convert"))),
@@ -144,7 +146,8 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("inspect file", "file: not a bag of this package"),
         ("inspect bag", "bag: not a bag of this package"),
         (f"plot {LONG}", "cannot be read: File name too long"),
-        ("plot file", "file: no such scene"),
+        ("plot file", "file: no such scene; allowed: a scene, a bag (a directory, or .mcap), or a .npz file of"),
+        ("fit file --free object.mass_kg", "file: needs an ending, one of .mcap, .npz, .csv"),
         ("plot list", "list: not a bag of this package"),
         ("plot nothing.npz", "nothing.npz: cannot be read: No such file or directory"),
         ("plot empty.npz", "empty.npz: not a file of `grasp simulate`"),

@@ -28,7 +28,7 @@ from sensor_msgs.msg import JointState
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
-from grasp_ros.graph.bag.verify import laws_of
+from grasp_ros.graph.bag.verify import laws_of, verify
 from grasp_ros.graph.lockstep.synchronizer import Tick
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.nodes.lyapunov_monitor import LyapunovMonitor
@@ -211,6 +211,8 @@ def test_an_announcement_that_is_lost_is_seen_in_the_bag(tmp_path: Path) -> None
     assert recording.unheard == {"left/parameters": 2}
     assert recording.missing["left/parameters"] == 2
     assert laws_of(recording) == {"left": "not known: the bag lacks 2 announcements of its numbers"}
+    followed = "5 states follow from the recorded inputs, bit for bit; the bag lacks 2 announcements on left/parameters"
+    assert verify(recording).words == followed
 
 
 def test_help_names_what_can_be_set(loop: tuple[Any, ...]) -> None:

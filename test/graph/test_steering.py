@@ -249,14 +249,21 @@ def test_a_shell_ends_with_its_reader_and_without_an_input(words: str) -> None:
     assert (found.returncode in (0, 141), found.stderr) == (True, "")  # 141: `yes`, which nobody reads any more
 
 
+def test_a_shell_whose_reader_has_left_has_the_status_of_its_worst_line() -> None:
+    words = f"printf 'nonsense\\nhelp\\n' | {sys.executable} -m grasp_ros.cli ctl | true; exit ${{PIPESTATUS[1]}}"
+    found = ran("bash", "-c", words)
+    assert (found.returncode, found.stderr.startswith("nonsense: not allowed")) == (2, True)
+
+
 def test_a_shell_that_waits_for_words_ends_with_a_signal(launch: Any) -> None:
     shell = launch(*GRASP, "ctl", **PIPES)
-    shell.stdin.write("help\n")
+    shell.stdin.write("nonsense\nhelp\n")
     shell.stdin.flush()
     assert shell.stdout.readline().startswith("pause, resume")
     shell.send_signal(signal.SIGINT)
     assert shell.wait(DEADLINE) == 130
-    assert shell.communicate() == ("", "")
+    out, err = shell.communicate()
+    assert (out, err.count("\n")) == ("", 1)
 
 
 def test_an_output_that_is_full_is_a_sentence() -> None:

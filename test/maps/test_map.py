@@ -411,6 +411,16 @@ def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureF
     assert picture.read_text() == "somebody else's"
 
 
+def test_more_runs_than_memory_holds_are_refused_before_the_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A thousand million of them ended in a traceback."""
+    monkeypatch.setattr("grasp_ros.maps.plan.MOST", 10**15)
+    axes = ["--x", f"{GAIN}=1:2:9999999", "--y", "object.mass_kg=1:2:9999999"]
+    assert main(["map", "case_01", *axes, "-o", str(tmp_path / "new.zarr")]) == 2
+    assert "case_01: runs: 99999980000001 is not allowed; allowed: as many as fit into" in capsys.readouterr().err
+
+
 def test_quantiles_between_two_values_are_their_mean() -> None:
     """Those of an even number were the lower one; the last was not the mirror image of the first."""
     units = {"units": "s"}

@@ -156,6 +156,7 @@ NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
     (lambda side: contact_intervals(simulate(CASE), side), 0, "side: int"),
     (lambda weights: simulate(CASE).section(weights), {}, "section: {}"),
     (scenes.load, None, "reference: NoneType"), (load, 1, "path: int"), (read_bag, [], "path: list"),
+    *((door, "", "path: ''") for door in (load, read_bag, lambda path: simulate(CASE).save(path))),
     (lambda path: simulate(CASE).save(path), None, "path: NoneType"),
     (lambda path: simulate(CASE).to_csv(path), 1, "path: int"),
     (lambda text: scenes.parse(text, "case", "case"), None, "case: text: NoneType"),

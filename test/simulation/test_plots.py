@@ -90,7 +90,9 @@ def test_the_height_fits_what_lies_within_the_span() -> None:
     assert [axes.get_ylim() for axes in compose([short, run], span=(15.0, 20.0)).axes[1::2]] == [
         axes.get_ylim() for axes in (displacement, inputs, impacts, levels)]
     stopped = simulate(scenes.load("case_01"), max_events=3)
-    assert not any(len(line.get_xdata()) for line in compose([stopped], span=(15.0, 20.0)).axes[-1].lines)
+    assert not any(len(line.get_xdata()) for line in compose([stopped, run], span=(15.0, 20.0)).axes[-2].lines)
+    with pytest.raises(Refused, match=r"^nothing to draw from 15 to 20 s: the motion is from 0 to 0\.\d+ s$"):
+        compose([stopped], span=(15.0, 20.0))
 
 
 def test_the_title_says_that_a_run_stopped() -> None:

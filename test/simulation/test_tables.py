@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -81,5 +82,6 @@ def test_what_is_public_is_there() -> None:
     for name in gr.__all__:
         assert getattr(gr, name) is not None
         assert name in dir(gr)
+    assert gr.__version__ == version("grasp_ros")
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
         gr.nothing  # noqa: B018

@@ -50,7 +50,8 @@ def _file_of(path: Path) -> Path:
         raise BagError(f"{path}: its storage is sqlite3; allowed: MCAP, {CONVERT}")
     if any(path.glob("*.mcap.*")) or path.suffix == PACKED:
         raise BagError(f"{path}: its file is compressed as a whole; allowed: chunks, {CONVERT}")
-    raise BagError(f"{path}: not {KIND}: holds {len(files)} .mcap files; allowed: one")
+    joined = f", {CONVERT}" if files else ""
+    raise BagError(f"{path}: not {KIND}: holds {len(files)} .mcap files; allowed: one{joined}")
 
 
 class Opened:
@@ -73,7 +74,7 @@ class Opened:
                     raise BagError(f"{path}: its messages are compressed one by one; allowed: chunks, {CONVERT}")
                 records[OWN_RECORD] = _record_from_topics(first, path)
             if OWN_RECORD not in records:
-                why = "".join(f": {why}" for _, _, why in self.storage.left_out[:1])
+                why = "".join(f": {why}" for _, _, why in self.storage.unread[:1])
                 raise EmptyBagError(f"{path}: holds no tick{why}")
             own = records[OWN_RECORD]
             self.scene = scenes.parse(own["scene"], path.name, str(path))

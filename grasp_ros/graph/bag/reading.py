@@ -58,16 +58,19 @@ def _recording(opened: Opened) -> Recording:
     stamps, rows = array("q"), array("d")
     for time_ns, tick, others in ticks_of(opened, reader.topics):
         counts.update([*tick, *(topic for topic, _ in others)])
-        for topic, stored in others:
-            if topic in topics.CHANGES.values():
-                changes.add(topic, stored)
-            elif topic == topics.TIMING:
-                timing.extend(_timing(quality, stored))
-            elif topic in held:  # a command of a free run, which belongs to no tick
-                held[topic].append(reader.force(topic, stored))
-            else:
-                check_own(opened, topic, stored)
-        row = reader.row(time_ns, tick) if tick else []
+        try:
+            for topic, stored in others:
+                if topic in topics.CHANGES.values():
+                    changes.add(topic, stored)
+                elif topic == topics.TIMING:
+                    timing.extend(_timing(quality, stored))
+                elif topic in held:  # a command of a free run, which belongs to no tick
+                    held[topic].append(reader.force(topic, stored))
+                else:
+                    check_own(opened, topic, stored)
+            row = reader.row(time_ns, tick) if tick else []
+        except UNREADABLE as error:
+            raise BagError(f"{opened.path}: {error or type(error).__name__}; `grasp recover` leaves it out") from None
         if topics.JOINT_STATES in tick:
             stamps.extend((time_ns, reader.stamp_ns))
             rows.extend(row)
@@ -129,7 +132,7 @@ def check_own(opened: Opened, topic: Topic, stored: Stored) -> None:
     if topic in (topics.SCENE, topics.RUN):
         own = opened.storage.records[OWN_RECORD][topic.name]
         if decode(topic, stored.cdr).data != own:
-            raise BagError(f"{opened.path}: {stored.topic}: another {topic.name} than in the bag's own record")
+            raise BagError(f"{stored.topic}: another {topic.name} than in the bag's own record")
 
 
 def _with_our_times(opened: Opened, wanted: Container[Topic]) -> Iterator[tuple[Topic, Stored]]:
@@ -285,7 +288,7 @@ def _timing(names: Sequence[str], stored: Stored) -> Iterator[Sequence[float]]:
 def _lost(storage: Storage) -> dict[str, str]:
     """How the recording ended and what is missing, as the bag says it; without its word, what the reader has found."""
     if not storage.closed:
-        left_out = sum(size for _, size, _ in storage.left_out)
+        left_out = sum(size for _, size, _ in storage.unread)
         return {"end": f"not closed; {left_out} bytes behind the last whole chunk are left out"}
     anew = {"end": "written anew by another program, which does not say what was lost"}
     return {key: word for key, word in storage.records.get(LOST_RECORD, anew).items() if key != METADATA_DIGEST}

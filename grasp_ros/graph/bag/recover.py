@@ -69,7 +69,7 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
                 if topic not in (SCENE, RUN, CLOCK):  # which the recorder writes itself
                     recorder.write(topic, stored.cdr)
     finally:
-        left_out = [f"{size} bytes from byte {offset} on: {why}" for offset, size, why in opened.storage.left_out]
+        left_out = [f"{size} bytes from byte {offset} on: {why}" for offset, size, why in opened.storage.unread]
         left_out += [f"{why}: {count}" for why, count in opened.left_out.items()]
         left_out += [f"parts of {len(at)} ticks, the first {at[0]}: {why}" for why, at in refused.items()]
         left_out = [*map(printable, left_out)]  # names of topics, say, which may be anything
@@ -77,6 +77,6 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
             source, lost = printable(str(opened.path)), "; ".join(left_out) or "none"
             recorder.close({SOURCE: source, LEFT_OUT: lost})
     if recorder is None:
-        reasons = (*(why for _, _, why in opened.storage.left_out), *refused, "it holds no tick")
+        reasons = (*(why for _, _, why in opened.storage.unread), *refused, "it holds no tick")
         raise BagError(f"{opened.path}: nothing can be recovered: {reasons[0]}")
     return Recovery(written, left_out, recorder.gaps)

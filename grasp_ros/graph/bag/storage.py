@@ -60,7 +60,7 @@ class Storage:
     def __init__(self, path: Path, salvage: bool = False) -> None:
         self.path, self._salvage = path, salvage
         # Both are complete when all messages have been taken.
-        self.left_out: list[tuple[int, int, str]] = []  # offset, size and reason of what was not read
+        self.unread: list[tuple[int, int, str]] = []  # offset, size and reason of what was not read
         self.records: dict[str, dict[str, str]] = {}  # of metadata, by name
         self.ours = False  # whether this package has written it
         self._channels: dict[int, Channel] = {}
@@ -101,7 +101,7 @@ class Storage:
         if self._salvage:
             behind = footer + FOOTER_BYTES
             if footer >= 0 and behind < len(self._data):
-                self.left_out.append((behind, len(self._data) - behind, "behind the end of the bag"))
+                self.unread.append((behind, len(self._data) - behind, "behind the end of the bag"))
             return
         if not self.closed and 0 <= footer <= len(self._data) - FOOTER_BYTES:
             self._refuse("its last bytes are not the end of an MCAP file")
@@ -195,7 +195,7 @@ class Storage:
         if not self._salvage and (self.closed or following is not None):
             self._refuse(f"{why}, at byte {offset}")
         end = len(self._data) if following is None else following
-        self.left_out.append((offset, end - offset, why))
+        self.unread.append((offset, end - offset, why))
         return end
 
     def _next_chunk(self, offset: int) -> int | None:

@@ -154,6 +154,7 @@ def _gap(recording: Recording, lost: Mapping[str, np.ndarray]) -> str:
              for name, rows in lost.items() if rows.any()]
     words += [f"{topic.name} of {without} ticks" for topic in (CLOCK, JOINT_STATES)
               if (without := recording.missing[topic.name])]
+    words += [f"{number} announcements on {name}" for name, number in recording.unheard.items()]
     if cut := recording.missing.get(WRITTEN):
         words.append(f"{cut} messages that its recorder has written")
     for side, forces in recording.held.items():
@@ -241,8 +242,10 @@ def _lyapunov(recording: Recording, rows: np.ndarray, states: Array, external: A
     """What the monitor has computed, by LYAPUNOV_NAMES; `closed` is what it knew, so that only 0 and 1 are compared."""
     system = recording.scene.system
     closed = recording.lyapunov[rows, LYAPUNOV_NAMES.index("closed")] == 1.0
-    V = np.full((3, len(rows)), np.nan)
-    for scene, part in recording.parts:
+    V, parts = np.full((3, len(rows)), np.nan), recording.parts
+    if recording.unheard:  # of numbers that nobody knows: what the monitor says stands
+        V, parts = recording.lyapunov[rows, :3].T, []
+    for scene, part in parts:
         own = closed & (rows >= part.start) & (rows < part.stop)
         if own.any():
             V[:, own] = energy(scene.system, states[own], external[own])[:3]

@@ -61,9 +61,10 @@ class Remote(GraspNode):
         on_signals(stop)
         try:
             if not received:
-                self.exit_code = self.do(self._wanted) if self._wanted else self.shell()
+                for words in [self._wanted] if self._wanted else self.lines():
+                    self.do(words)
         except KeyboardInterrupt:
-            pass
+            self.exit_code = 0  # that of the signal counts
         except OSError as error:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             if not isinstance(error, BrokenPipeError):  # the reader of our output, `head` say, has had it
@@ -73,19 +74,19 @@ class Remote(GraspNode):
             note_signals(received)
         return True
 
-    def shell(self) -> int:
-        """Do what the lines of the standard input ask for, until it ends; the exit status of the worst one."""
-        status, prompt = 0, "grasp> " if sys.stdin.isatty() else ""
+    def lines(self) -> Iterator[list[str]]:
+        """Words of the lines of the standard input, until it ends."""
+        prompt = "grasp> " if sys.stdin.isatty() else ""
         while True:
             print(prompt, end="", flush=True)
             words = sys.stdin.readline()
             if not words or words.strip() in FAREWELL:
-                return status
+                return
             if words.strip():
-                status = max(status, self.do(words.split()))
+                yield words.split()
 
-    def do(self, words: Sequence[str]) -> int:
-        """Do what some words ask for, and print what there is to say; exit status 1 if nobody answers or does it."""
+    def do(self, words: Sequence[str]) -> None:
+        """Do what some words ask for, and print what there is to say; the exit code is that of the worst refusal."""
         action = self._actions.get(words[0])
         wrong = Refused(f"{' '.join(words)}: not allowed; allowed: {HELP}")
         try:
@@ -100,9 +101,8 @@ class Remote(GraspNode):
             if answer:
                 print(answer, flush=True)
         except Refused as error:
+            self.exit_code = max(self.exit_code, error.exit_status)
             print(error, file=sys.stderr, flush=True)
-            return error.exit_status
-        return 0
 
     def step(self, number: str = "1") -> str:
         """Let a paused plant do some periods."""
@@ -125,7 +125,7 @@ class Remote(GraspNode):
             if found != before:
                 deadline = time.monotonic() + PATIENCE_SECONDS
             elif time.monotonic() > deadline:
-                raise Failed(f"the plant does not go on: {_line(found)}")
+                raise Failed(f"no progress in {PATIENCE_SECONDS:g} s: {_line(found)}")
         return _line(found)
 
     def _status(self, service: str) -> dict[str, Any]:
