@@ -25,23 +25,11 @@ def shortened(line: str) -> str:
     return f"{first[: part.start()] if part else first} ... {last[rest.end():] if rest else last}"
 
 
-class _Once(argparse._StoreAction):
-    """Takes the value of an option: of two values the first would be lost without a word."""
-
-    def __call__(self, parser: Any, namespace: argparse.Namespace, values: Any, option: str | None = None) -> None:
-        if option and self.dest in parser.given:
-            raise argparse.ArgumentError(self, "given twice; allowed: once")
-        parser.given.add(self.dest)
-        super().__call__(parser, namespace, values, option)
-
-
 class Parser(argparse.ArgumentParser):
-    """A parser of one command, or of `grasp` itself, for one command line."""
+    """A parser of one command, or of `grasp` itself."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
-        self.given: set[str] = set()  # options
-        self.register("action", None, _Once)
         self.register("type", float, _number)
         self._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")  # -1e-3 is no option, either
 

@@ -63,8 +63,6 @@ def test_help_is_there_at_once() -> None:
         ("simulate case_01 --method rk5", "argument --method: rk5 is not allowed; did you mean rk45?"),
         ("simulate case_01 --set zzz.qqq=1", "no such key; allowed: time.duration_s, "),
         ("new", "the following arguments are required: FILE.yaml"),
-        ("map case_01 --x object.mass_kg=1:2 --x left_arm.mass_kg=1:2 -o a.zarr", "--x: given twice; allowed: once"),
-        ("simulate case_01 -o a.npz --output b.npz", "argument -o/--output: given twice; allowed: once"),
     ],
 )
 def test_a_refusal_is_short_and_says_what_was_meant(command: Any, words: str, complaint: str) -> None:
