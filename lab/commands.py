@@ -61,12 +61,11 @@ def _output(metavar: str, text: str, default: Path) -> Option:
 
 def _paper(options: Options) -> int:
     from lab.paper import page, study
-    from lab.paper.definitions import RANDOM_STARTS
     from lab.studies import pages
 
     pages.claim(options.output)
     prepare()
-    found = study.report(QUICK_STARTS if options.quick else RANDOM_STARTS)
+    found = study.report(QUICK_STARTS if options.quick else study.RANDOM_STARTS)
     page.write_html(found, options.output)
     print(page.summary(found.claims))
     for claim in found.claims:
@@ -75,13 +74,6 @@ def _paper(options: Options) -> int:
     if options.docs is not None:
         page.write_markdown(found, options.docs / "paper.md")
         print(f"written to {options.docs / 'paper.md'}")
-    return 0
-
-
-def _domain(options: Options) -> int:
-    from lab.studies import domain
-
-    domain.run(options.docs)
     return 0
 
 
@@ -155,20 +147,12 @@ def _derivatives(options: Options) -> int:
     return 0
 
 
-def _steering(options: Options) -> int:
-    from lab.drills import steering
-
+def _repeated(module: str, options: Options) -> int:
+    """A drill that does the same to runs of one scene so many times."""
+    drill = import_module(f"lab.drills.{module}")
     scene = load_scene(options.scene, options.settings)
     prepare()
-    return 0 if steering.run(scene, options.calls, options.seed) else 1
-
-
-def _recorder(options: Options) -> int:
-    from lab.drills import recorder
-
-    scene = load_scene(options.scene, options.settings)
-    prepare()
-    return 0 if recorder.run(scene, options.kills, options.seed) else 1
+    return 0 if drill.run(scene, options.times, options.seed) else 1
 
 
 def _faults(options: Options) -> int:
@@ -193,7 +177,8 @@ COMMANDS = (
         _asked("--quick", action="store_true", help=f"{QUICK_STARTS} random starts: to try it out"),
         _output("FILE.html", "the page, in one file", PAPER_PAGE),
     ), "paper"),
-    Command("domain", "which scenes are simulated: every bound and its reason", _domain, page="domain"),
+    Command("domain", "which scenes are simulated: every bound and its reason", partial(_printed, "domain"),
+            page="domain"),
     Command("certificate", "where the paper's V jumps; limits of the control period", partial(_printed, "certificate"),
             page="jumps"),
     Command("hard", "hard cases: the error reached, and what others reach", _hard, (
@@ -219,12 +204,13 @@ COMMANDS = (
             page="costs"),
     Command("maps", "where a grasp settles, and how robust it is; resumes", partial(_resumed, "map_page"), RESUMED,
             "maps"),
-    Command("recorder", "recordings are killed: what is left in their bags", _recorder, (
-        add_scene, _asked("--kills", type=whole(0), default=10, metavar="N", help="how many recordings (default 10)"),
-        SEED,
+    Command("recorder", "recordings are killed: what is left in their bags", partial(_repeated, "recorder"), (
+        add_scene, SEED,
+        _asked("--kills", dest="times", type=whole(0), default=10, metavar="N", help="how many (default 10)"),
     )),
-    Command("steering", "random pause, step, resume and reset calls, each checked", _steering, (
-        add_scene, _asked("--calls", type=whole(1), default=1000, metavar="N", help="how many (default 1000)"), SEED,
+    Command("steering", "random pause, step, resume and reset calls, each checked", partial(_repeated, "steering"), (
+        add_scene, SEED,
+        _asked("--calls", dest="times", type=whole(1), default=1000, metavar="N", help="how many (default 1000)"),
     )),
     Command("faults", "accidents done to graphs of real processes, some minutes", _faults, (
         _asked("--only", nargs="+", default=[], metavar="NAME", help="these drills alone"),

@@ -17,7 +17,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.quantities import contact_intervals
-from lab.paper.cases import Figure, value_of
+from lab.paper.cases import FIGURES, Cases, Figure, value_of
 
 RATE = 60.0  # frames a second
 IN_CONTACT = 40  # more frames in each contact
@@ -63,8 +63,12 @@ def pack(name: str, values: Array) -> Packed:
     return Packed(np.round(values / scale), scale)
 
 
-def replay(figure: Figure, scene: Scene) -> dict[str, Any]:
-    """What the page embeds of one case."""
+def replays(cases: Cases) -> list[dict[str, Any]]:
+    """What the page embeds of all cases."""
+    return [_replay(figure, cases[figure.case]) for figure in FIGURES]
+
+
+def _replay(figure: Figure, scene: Scene) -> dict[str, Any]:
     table = frames(scene)
     packed = [pack(name, values) for name, values in zip(COLUMNS, table.T, strict=True)]
     numbers = np.concatenate([column.numbers for column in packed]).astype("<i2")

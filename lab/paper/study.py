@@ -37,10 +37,11 @@ from lab.paper.measures import MEASURES
 from lab.paper.page import Picture, Report
 from lab.paper.prints import compared
 from lab.paper.quantities import quantities
-from lab.paper.replay import replay
+from lab.paper.replay import replays
 from lab.paper.results import Beyond
 from lab.paper.statements import STATEMENTS
 
+RANDOM_STARTS = 200
 DPI = 220
 COLORS = 256  # of a PNG file
 Jobs = dict[str, tuple[Any, ...]]  # by what comes out: what computes it, and of what
@@ -85,12 +86,13 @@ def _further_jobs(cases: Cases, drawn: list[Start]) -> Jobs:
 
 
 def _drawing_jobs(cases: Cases) -> Jobs:
-    return {"sheet": (_sheet, cases), **{f"fig_{each.number:02d}": (_large, each, cases) for each in FIGURES}}
+    return {"sheet": (_drawn, figures.sheet, cases),
+            **{f"fig_{each.number:02d}": (_drawn, figures.large, each, cases) for each in FIGURES}}
 
 
 def _table_jobs(cases: Cases) -> Jobs:
     return {"equations": (equations, cases), "quantities": (quantities, cases), "doubts": (doubts, cases),
-            "replays": (_replays, cases)}
+            "replays": (replays, cases)}
 
 
 def _further(compute: Callable[..., Any], draw: Callable[[Any], Any], *of: Any) -> tuple[Any, bytes]:
@@ -102,16 +104,8 @@ def _stepped(cases: Cases) -> tuple[Any, bytes]:
     return arms.stepped(cases), image(beyond_figures.stepped(cases))
 
 
-def _sheet(cases: Cases) -> bytes:
-    return image(figures.sheet([figures.pictured(figure, cases) for figure in FIGURES]))
-
-
-def _large(figure: Figure, cases: Cases) -> bytes:
-    return image(figures.large(figures.pictured(figure, cases)))
-
-
-def _replays(cases: Cases) -> list[dict[str, Any]]:
-    return [replay(figure, cases[figure.case]) for figure in FIGURES]
+def _drawn(draw: Callable[..., Any], *of: Any) -> bytes:
+    return image(draw(*of))
 
 
 def image(drawing: Any) -> bytes:
