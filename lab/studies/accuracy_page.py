@@ -62,7 +62,8 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
         contender for contender in all_contenders(case) if contender.family == OURS or not quick])
     drifts = drift.run(directory, *((QUICK_S, QUICK_DRIFT) if quick else (drift.SECONDS, None)))
     predictions = predictability.run(subjects, QUICK_S if quick else predictability.SECONDS)
-    limits = stability.limits(grasp_of(case).left)
+    arm = grasp_of(case).left
+    limits = stability.limits(arm)
     points = loop.run(case, directory, () if quick else loop.GRAPH_PERIODS_MS)
 
     write_csv(records, place / "records.csv")
@@ -71,7 +72,7 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
     figures.energy_drift(drifts, place / "energy_drift.png")
     figures.prediction(predictions, place / "prediction.png")
     figures.control_period(points, case.name, place / "control_period.png")
-    figures.stability(*stability.curves(grasp_of(case).left, limits), place / "stability.png")
+    figures.stability(arm, limits, place / "stability.png")
     return pages.write(
         docs, "accuracy", metric=accuracy.METRIC, points=simulation.GRID_POINTS, **accuracy_rows.by_error(records),
         drift=accuracy_rows.drift(drifts), prediction=accuracy_rows.prediction(predictions),
