@@ -92,7 +92,7 @@ def _profiles(subjects: Sequence[Scene], records: Sequence[Record]) -> list[prof
     return found
 
 
-def _final_states(subjects: Sequence[Scene], directory: Path) -> dict[str, list[speed.Timing]]:
+def _final_states(subjects: Sequence[Scene], directory: Path) -> dict[str, list[speed.Timing | None]]:
     journal = Journal(directory)
     return {scene.name: speed.final_state(scene, measure.truth(scene, journal), accuracy_rows.ERROR)
             for scene in subjects}

@@ -144,13 +144,11 @@ def profiles(found: Sequence[Profile]) -> list[list[str]]:
     return rows
 
 
-def last_state(timings: dict[str, list[Timing]]) -> dict[str, Any]:
+def last_state(timings: dict[str, list[Timing | None]]) -> dict[str, Any]:
     """The last state alone, where a rival has less to do."""
     rows, ratios = [], []
-    for name, row in timings.items():
-        times = {timing.record.method == EXACT: timing for timing in row}
-        own, other = times.get(True), times.get(False)
-        ratio = other.median / own.median if own is not None and other is not None else None
+    for name, (own, other) in timings.items():
+        ratio = other.median / own.median if own and other else None
         ratios += [] if ratio is None else [ratio]
         cells = [f"{1e3 * t.median:.3g} ms, error {t.record.error:.0e}" if t else "not reached" for t in (own, other)]
         rows.append([name, *cells, "-" if ratio is None else f"{ratio:.2f}"])
