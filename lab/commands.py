@@ -66,14 +66,12 @@ def _paper(options: Options) -> int:
     pages.claim(options.output)
     prepare()
     found = study.report(QUICK_STARTS if options.quick else study.RANDOM_STARTS)
-    page.write_html(found, options.output)
     print(page.summary(found.claims))
     for claim in found.claims:
         print(f"  {claim.key:4} {claim.verdict.value:27} {claim.statement}")
-    print(f"written to {options.output}")
+    page.write_html(found, options.output)
     if options.docs is not None:
         page.write_markdown(found, options.docs / "paper.md")
-        print(f"written to {options.docs / 'paper.md'}")
     return 0
 
 
@@ -123,12 +121,12 @@ def _resumed(module: str, options: Options) -> int:
     """A study that goes on from what it has measured, and whose result is its page."""
     study = import_module(f"lab.studies.{module}")
     prepare()
-    print(f"written to {study.write(options.docs or options.output, options.output, options.quick)}")
+    study.write(options.docs or options.output, options.output, options.quick)
     return 0
 
 
 def _printed(module: str, options: Options) -> int:
-    """A study that prints its numbers, and writes its page where one is wanted."""
+    """A study that prints its page, or writes it."""
     study = import_module(f"lab.studies.{module}")
     prepare()
     study.run(options.docs)
@@ -143,7 +141,7 @@ def _derivatives(options: Options) -> int:
     found = derivatives.tables(wanted, options.output, options.draws)
     print("\n\n".join(found.values()))
     if options.docs is not None:
-        print(f"written to {derivatives.write(options.docs, found)}")
+        derivatives.write(options.docs, found)
     return 0
 
 

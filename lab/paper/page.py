@@ -101,7 +101,6 @@ def _template(name: str) -> str:
 
 
 def _render(name: str, report: Report, *, autoescape: bool, **more: object) -> str:
-    """A template with what both pages say."""
     # by the words of a part, the key of the first statement that has it: it is told there
     told = {part.statement: claim.key for claim in reversed(report.claims) for part in claim.parts}
     filters = {"cell": lambda text: text.replace("|", "\\|"), "told": told.__getitem__}

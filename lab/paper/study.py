@@ -35,7 +35,7 @@ from lab.paper.equations import equations
 from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import MEASURES
 from lab.paper.page import Picture, Report
-from lab.paper.prints import compared
+from lab.paper.prints import LETTERS, compared
 from lab.paper.quantities import quantities
 from lab.paper.replay import replays
 from lab.paper.results import Beyond
@@ -108,8 +108,7 @@ def picture(figure: Figure, cases: Cases, claims: Sequence[Claim]) -> Picture:
     scene = cases[figure.case]
     run = simulate(scene)
     left, right = (len(run.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))
-    values = ", ".join(f"{letter} = {value_of(scene, letter):g}"
-                       for letter in ("m_l", "m_r", "k", "c", "Kp", "Kv", "p", "H", "m_o"))
+    values = ", ".join(f"{letter} = {value_of(scene, letter):g}" for letter in LETTERS)
     x_l, x_r, x_o = start_of(scene)
     both = "" if (run.energy.V_c == run.energy.V).all() else " and V, where they differ"
     caption = (

@@ -34,8 +34,8 @@ QUICK_S = 5.0
 QUICK_DRIFT = {EXACT: 1e-16, "paper": 1e-3, "discrete_gradient": 1e-3}
 
 
-def write(docs: Path, directory: Path, quick: bool) -> Path:
-    """Run all studies, as far as the journal does not have them; returns the page.
+def write(docs: Path, directory: Path, quick: bool) -> None:
+    """Run all studies, as far as the journal does not have them, and write the page.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
     figures.prediction(predictions, place / "prediction.png")
     figures.control_period(points, case.name, place / "control_period.png")
     figures.stability(arm, limits, place / "stability.png")
-    return pages.write(
+    pages.write(
         docs, "accuracy", metric=accuracy.METRIC, points=simulation.GRID_POINTS, **accuracy_rows.by_error(records),
         drift=accuracy_rows.drift(drifts), prediction=accuracy_rows.prediction(predictions),
         topics=accuracy_rows.topics(case.title, points, limits),

@@ -41,7 +41,6 @@ def by_error(records: Sequence[Record]) -> dict[str, Any]:
 
 
 def _choice(scenes: dict[str, list[Record]]) -> dict[str, Any]:
-    """Which method for which error."""
     rows, ahead, ratios, finest = [], 0, [], []
     for name, here in scenes.items():
         mine = [record for record in here if record.method == EXACT]
@@ -58,7 +57,6 @@ def _choice(scenes: dict[str, list[Record]]) -> dict[str, Any]:
 
 
 def _paper(name: str, here: Sequence[Record]) -> list[str]:
-    """What the paper's method costs on a scene."""
     runs = [record for record in here if record.method == "paper"]
     found, own = fastest(runs, LOOSE), _fastest(here, [EXACT], LOOSE)
     best = min((record for record in runs if record.good), key=lambda record: record.error or 0.0, default=None)
@@ -70,7 +68,6 @@ def _paper(name: str, here: Sequence[Record]) -> list[str]:
 
 
 def _tolerance(records: Sequence[Record], names: list[str]) -> dict[str, Any]:
-    """The errors at one tolerance."""
     chosen = [r for r in records if r.knob == TOLERANCE and abs(r.setting / SAME_TOLERANCE - 1.0) < 1e-6]
     factors = [record.error / SAME_TOLERANCE for record in chosen if record.error is not None]
     rows = []
@@ -82,7 +79,6 @@ def _tolerance(records: Sequence[Record], names: list[str]) -> dict[str, Any]:
 
 
 def _missed(records: Sequence[Record]) -> dict[str, Any]:
-    """Contacts missed, and runs that failed."""
     wrong = [record for record in records if record.missed]
     failed = [[r.scene, r.method, f"{r.knob} {r.setting:.0e}", r.status] for r in records if not r.good]
     return {"wrong": len(wrong), "runs": len(records), "silent": sum(record.status == "done" for record in wrong),

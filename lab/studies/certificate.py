@@ -148,18 +148,15 @@ def search(family: Family, draws: int, steps: int, seed: int) -> Found:
 
 
 def run(docs: Path | None) -> None:
-    """Print jumps and limits; with a directory of pages, write the page there.
+    """Print the page on jumps and limits, or write it into a directory of pages.
 
     Raises
     ------
     Refused
-        If the page cannot be written.
+        If it cannot be written.
     """
-    found = {"jumps": jump_rows(), "limits": limit_rows(), "smallest": smallest_rows(DRAWS, STEPS)}
-    for rows in found.values():
-        print("\n".join(" ".join(row) for row in rows), end="\n\n")
-    if docs is not None:
-        pages.write(docs, "jumps", amplitude=AMPLITUDE, horizon=HORIZON, draws=DRAWS, steps=STEPS, seed=SEED, **found)
+    pages.write(docs, "jumps", jumps=jump_rows(), limits=limit_rows(), smallest=smallest_rows(DRAWS, STEPS),
+                amplitude=AMPLITUDE, horizon=HORIZON, draws=DRAWS, steps=STEPS, seed=SEED)
 
 
 def limit_rows() -> list[list[str]]:

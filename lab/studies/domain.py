@@ -26,7 +26,4 @@ def run(docs: Path | None) -> None:
     Refused
         If it cannot be written.
     """
-    if docs is None:
-        print(pages.render("domain", **numbers()), end="")
-    else:
-        pages.write(docs, "domain", **numbers())
+    pages.write(docs, "domain", **numbers())

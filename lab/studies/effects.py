@@ -52,7 +52,7 @@ class Cost(NamedTuple):
 
 
 def run(docs: Path | None) -> None:
-    """Print the costs; with a directory of pages, write the page with its figure there.
+    """Print the page on costs, or write it with its figure into a directory of pages.
 
     Raises
     ------
@@ -64,11 +64,10 @@ def run(docs: Path | None) -> None:
     costs = measure(found)
     keys = {name: added(scene, one) if name in BY_SECTION else [] for name, one in found.items()}
     rows = [row(name, keys[name], counts(one), costs[name]) for name, one in found.items()]
-    print("\n".join("  ".join(cells) for cells in rows))
     if docs is not None:
         shown = [(name, cost.tick * 1e6, cost.bag / 1e3) for name, cost in costs.items()]
         page_figures.effect_costs(shown, docs / f"{PAGE}.png")
-        pages.write(docs, PAGE, scene=scene, rows=rows)
+    pages.write(docs, PAGE, scene=scene, rows=rows)
 
 
 def variants(scene: Scene) -> dict[str, Scene]:
@@ -162,7 +161,6 @@ def physics_of(scene: Scene) -> Callable[[], Array]:
 
 
 def _bag_size(scene: Scene) -> float:
-    """Bytes that a simulated second takes in a bag."""
     short = scene.changed({"time.duration_s": RECORDED_S})
     with tempfile.TemporaryDirectory() as directory:
         bag = Path(directory) / "bag"

@@ -19,8 +19,8 @@ OUTCOMES = ("touches_left", "touches_right", "peak_input_left", "peak_input_righ
             "peak_impact_right")
 
 
-def write(docs: Path, directory: Path, quick: bool) -> Path:
-    """Compute what is not there yet, and write the page with its pictures; returns it.
+def write(docs: Path, directory: Path, quick: bool) -> None:
+    """Compute what is not there yet, and write the page with its pictures.
 
     Raises
     ------
@@ -37,8 +37,8 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
     map_figures.settling(settled, place / "settling.png")
     map_figures.limits(limits, place / "limits.png")
     figures.draw(data, plan, "settling_time", place / "robustness.png")
-    return pages.write(docs, "maps", maps=maps, found=settled, map=_map(settled), loops=limits.loops, plan=plan,
-                       sample=_sample(plan, data), seconds=seconds)
+    pages.write(docs, "maps", maps=maps, found=settled, map=_map(settled), loops=limits.loops, plan=plan,
+                sample=_sample(plan, data), seconds=seconds)
 
 
 def _map(found: maps.Settling) -> dict[str, Any]:
