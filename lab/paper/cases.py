@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -99,6 +98,7 @@ FIGURES = (
     Figure(11, "Kv_l = Kv_r = 5 N s/m", "10 times the velocity feedback gains", ("Kv",), TENFOLD, ("O11",)),
     Figure(12, "m_o = 50 kg", "10 times the mass, object", ("m_o",), TENFOLD, ("O12",)),
 )
+_STARTED: dict[tuple[str, str, Start], Scene] = {}
 
 
 def load_cases() -> dict[int, Scene]:
@@ -106,10 +106,12 @@ def load_cases() -> dict[int, Scene]:
     return {number: scenes.load(f"case_{number:02d}") for number in NUMBERS}
 
 
-@cache
 def started(scene: Scene, start: Start) -> Scene:
     """A scene that begins at rest somewhere else; each is made once, because comparisons ask for the same ones."""
-    return scene.changed(dict(zip(PLACES, start, strict=True)))
+    key = scene.name, text_of(scene), start
+    if key not in _STARTED:
+        _STARTED[key] = scene.changed(dict(zip(PLACES, start, strict=True)))
+    return _STARTED[key]
 
 
 def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
@@ -139,6 +141,13 @@ def start_of(scene: Scene) -> Start:
 def moved(scene: Scene, offset: float) -> Scene:
     """A scene whose left arm begins a little farther to the right, by an offset in m."""
     return scene.changed({"left_arm.position_m": start_of(scene).x_l + offset}) if offset else scene
+
+
+def text_of(scene: Scene, start: bool = True) -> str:
+    """All numbers of a scene, to know it again by; or all but the positions that it begins from."""
+    return repr(scene.values if start else {
+        section: {key: number for key, number in numbers.items() if key != "position_m"}
+        for section, numbers in scene.values.items()})
 
 
 def even(scene: Scene) -> bool:

@@ -15,7 +15,7 @@ from grasp_ros.simulation import simulate
 from grasp_ros.simulation.chunk import HORIZONS, SETTLED, Setup
 from grasp_ros.simulation.ensemble import ensemble
 from grasp_ros.simulation.quantities import settled_distance
-from lab.paper.cases import OFFSETS, PLACES, Start, start_of, started, value_of
+from lab.paper.cases import OFFSETS, PLACES, Start, start_of, started, text_of, value_of
 
 STRETCH = 20.0  # s, the paper's time axis
 SAMPLE = 4e-3  # s, of means and of changes of a sign
@@ -66,9 +66,7 @@ def over(scene: Scene, starts: Sequence[Start], name: str) -> list[float]:
         If a run does not reach its end.
     """
     kind = "settling" if name == "swings" else _MOTION if name in Motion._fields else name
-    apart = {section: {key: value for key, value in numbers.items() if key != "position_m"}
-             for section, numbers in scene.values.items()}
-    known = _KNOWN.setdefault((repr(apart), kind), {})
+    known = _KNOWN.setdefault((text_of(scene, start=False), kind), {})
     missing = [start for start in dict.fromkeys(starts) if start not in known]
     if missing:
         known.update(zip(missing, _measured(scene, missing, kind), strict=True))

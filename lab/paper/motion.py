@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 
 from grasp_ros import scene as scenes
@@ -15,6 +13,7 @@ from grasp_ros.physics.model import Array, Contact, Mode, hertzian_force
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, simulate
+from lab.paper.cases import text_of
 from lab.paper.measures import measure, seconds, settlings
 from lab.paper.universal import Found, threshold
 
@@ -28,14 +27,18 @@ EXACT = 1e-9  # s, an error of a time that counts as none
 ORDER = 0.1  # how much more than h^2 |u'' / u'| / 8 counts as of second order, since u'' is not constant
 SHARE = 1e-3  # of the clearance of (37) that rounding may take, in epsilon
 
+_RUNS: dict[str, Trajectory] = {}
 
-@cache
+
 def run_of(scene: Scene) -> Trajectory:
     """A motion over its horizon, with output times on both sides of every event; remembered."""
-    events = simulate(scene, grid=np.array([0.0])).event_table[:, 0]
-    beside = np.concatenate([events - BESIDE, events + BESIDE])
-    inside = beside[(beside > 0.0) & (beside < scene.duration)]
-    return simulate(scene, grid=np.unique(np.concatenate([np.linspace(0.0, scene.duration, 4001), inside])))
+    text = text_of(scene)
+    if text not in _RUNS:
+        events = simulate(scene, grid=np.array([0.0])).event_table[:, 0]
+        beside = np.concatenate([events - BESIDE, events + BESIDE])
+        inside = beside[(beside > 0.0) & (beside < scene.duration)]
+        _RUNS[text] = simulate(scene, grid=np.unique(np.concatenate([np.linspace(0.0, scene.duration, 4001), inside])))
+    return _RUNS[text]
 
 
 @threshold("rise of V between output times <= 1e-12 V(0)")
