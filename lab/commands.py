@@ -125,11 +125,21 @@ def _resumed(module: str, options: Options) -> int:
     return 0
 
 
-def _printed(module: str, options: Options) -> int:
-    """A study that prints its page, or writes it."""
+def _filled(module: str, page: str, options: Options) -> int:
+    """A study that has the numbers of a page, which is printed or written."""
+    from lab.studies import pages
+
     study = import_module(f"lab.studies.{module}")
     prepare()
-    study.run(options.docs)
+    pages.write(options.docs, page, **study.numbers())
+    return 0
+
+
+def _effects(options: Options) -> int:
+    from lab.studies import effects
+
+    prepare()
+    effects.run(options.docs)
     return 0
 
 
@@ -175,10 +185,10 @@ COMMANDS = (
         _asked("--quick", action="store_true", help=f"{QUICK_STARTS} random starts: to try it out"),
         _output("FILE.html", "the page, in one file", PAPER_PAGE),
     ), "paper"),
-    Command("domain", "which scenes are simulated: every bound and its reason", partial(_printed, "domain"),
-            page="domain"),
-    Command("certificate", "where the paper's V jumps; limits of the control period", partial(_printed, "certificate"),
-            page="jumps"),
+    Command("domain", "which scenes are simulated: every bound and its reason",
+            partial(_filled, "domain", "domain"), page="domain"),
+    Command("certificate", "where the paper's V jumps; limits of the control period",
+            partial(_filled, "certificate", "jumps"), page="jumps"),
     Command("hard", "hard cases: the error reached, and what others reach", _hard, (
         _asked("--alone", action="store_true", help="without other solvers, which takes a minute instead of ten"),
     ), "hard"),
@@ -198,7 +208,7 @@ COMMANDS = (
                 _asked("--draws", type=whole(1), default=300, metavar="N", help="random scenes (default 300)"),
                 JOURNAL,
             ), "derivatives"),
-    Command("effects", "what each effect costs: counts of work, times, bytes", partial(_printed, "effects"),
+    Command("effects", "what each effect costs: counts of work, times, bytes", _effects,
             page="costs"),
     Command("maps", "where a grasp settles, and how robust it is; resumes", partial(_resumed, "map_page"), RESUMED,
             "maps"),
