@@ -24,18 +24,14 @@ LONGEST = 0.5  # s; a contact that lasts longer needs no more frames
 COLUMNS = ("t", "x_l", "x_o", "x_r", "f_l", "f_r", "fw_l", "fw_r", "V_c")
 
 
-def frame_times(scene: Scene) -> Array:
-    """Times of the frames in s."""
+def frames(scene: Scene) -> Array:
+    """States, forces and V_c of all frames, (n, 9); see COLUMNS."""
     run = simulate(scene, grid=np.array([0.0, scene.duration]))
     spans = np.concatenate([contact_intervals(run, side) for side in SIDES])
     inside = [np.linspace(a, b, IN_CONTACT + 2) for a, b in spans.tolist() if b - a < LONGEST]
     even = np.linspace(0.0, scene.duration, round(scene.duration * RATE) + 1)
-    return np.unique(np.concatenate([even, *inside]).astype(np.float32)).astype(float)
-
-
-def frames(scene: Scene) -> Array:
-    """States, forces and V_c of all frames, (n, 9); see COLUMNS."""
-    run = simulate(scene, grid=frame_times(scene))
+    times = np.unique(np.concatenate([even, *inside]).astype(np.float32)).astype(float)
+    run = simulate(scene, grid=times)
     return np.column_stack([run.t, run.state[:, 0::2], run.command, run.impacts, run.energy.V_c])
 
 

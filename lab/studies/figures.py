@@ -36,18 +36,14 @@ HEIGHT, WIDTH = 3.1, 4.3  # inches, of a panel
 DPI = 130
 
 
-def color(method: str) -> str:
-    """One colour per family of methods."""
-    return next(value for name, value in COLORS.items() if method.startswith(name))
-
-
 def style(method: str) -> dict[str, Any]:
     """Solid where events are located or need not be, dashed where they are left to the right-hand side."""
     bold = method in ("exact", "paper")
     located = bold or method.endswith("_events") or method.startswith(("heyoka", "discrete"))
     mark = {"o": method.endswith("_events") or bold, "s": method == "odeint" or method.startswith("heyoka_")}
     return {
-        "color": color(method), "linestyle": "-" if located else (0, (4, 2)), "linewidth": 2.2 if bold else 0.9,
+        "color": next(value for name, value in COLORS.items() if method.startswith(name)),
+        "linestyle": "-" if located else (0, (4, 2)), "linewidth": 2.2 if bold else 0.9,
         "marker": next((m for m, is_so in mark.items() if is_so), "^"), "markersize": 3.5 if bold else 2.5,
         "zorder": 4 if bold else 2,
     }
