@@ -34,14 +34,13 @@ class Command(NamedTuple):
     asked: tuple[Option, ...] = ()
     page: str = ""
 
-    def add(self, commands: Any) -> argparse.ArgumentParser:
+    def add(self, commands: Any) -> None:
         """Add its parser to those of the program."""
         sub = add_command(commands, self.name, self._run, self.text)
         for add in self.asked:
             add(sub)
         if self.page:
             sub.add_argument("--docs", type=Path, metavar="DIRECTORY", help="write the page there as well")
-        return sub
 
     def _run(self, options: Options) -> int:
         if self.page and options.docs is not None:

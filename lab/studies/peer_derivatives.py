@@ -11,13 +11,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
-from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import mpmath
 import numpy as np
 
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import need
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import compose
 from grasp_ros.simulation import simulate
@@ -64,8 +63,7 @@ def run() -> list[Row]:
     Refused
         If a peer is not installed.
     """
-    if missing := [name for name in PACKAGES if find_spec(name) is None]:
-        raise Refused(f"this needs {', '.join(missing)}; pip install '.[lab,peers]'")
+    need("this", *PACKAGES)
     peers: tuple[Callable[[], Iterator[Row]], ...] = (_ours, *_DIFFRAX, _torchdiffeq, _mjx)
     return [min(peer(), key=lambda row: max(row.by)) for peer in peers]
 
