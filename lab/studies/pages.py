@@ -80,7 +80,7 @@ def claim(path: Path) -> None:
 
 def stamp() -> str:
     """The sentence that every measured page carries: date, commit and machine."""
-    machine = {name: text for name, text in describe_machine().items() if text != "not installed"}
+    machine = describe_machine()
     system, cpu = machine.pop("system"), machine.pop("cpu")
     versions = ", ".join(f"{name} {version}" for name, version in machine.items())
     return f"Measured on {time.strftime('%Y-%m-%d')} from commit {_commit()}: {system}, {cpu}, {versions}."
