@@ -74,13 +74,6 @@ def _paper(options: Options) -> int:
     return 0
 
 
-def _hard(options: Options) -> int:
-    from lab.studies import hard
-
-    prepare()
-    return hard.run(options.docs, alone=options.alone)
-
-
 def _fuzz(options: Options) -> int:
     from lab.drills import fuzz, random_scenes
     from lab.studies import pages
@@ -116,12 +109,14 @@ def _readers(options: Options) -> int:
     return 1 if broken else 0
 
 
-def _resumed(module: str, options: Options) -> int:
-    """A study that goes on from what it has measured, and whose result is its page."""
-    study = import_module(f"lab.studies.{module}")
-    prepare()
-    study.write(options.docs or options.output, options.output, options.quick)
-    return 0
+def _study(module: str, *asked: str) -> Callable[[Options], int]:
+    """A study that is asked some of the options; it may return an exit status."""
+    def run(options: Options) -> int:
+        study = import_module(f"lab.studies.{module}")
+        prepare()
+        return study.run(*(getattr(options, name) for name in asked)) or 0
+
+    return run
 
 
 def _filled(module: str, page: str, options: Options) -> int:
@@ -131,14 +126,6 @@ def _filled(module: str, page: str, options: Options) -> int:
     study = import_module(f"lab.studies.{module}")
     prepare()
     pages.write(options.docs, page, **study.numbers())
-    return 0
-
-
-def _effects(options: Options) -> int:
-    from lab.studies import effects
-
-    prepare()
-    effects.run(options.docs)
     return 0
 
 
@@ -188,7 +175,7 @@ COMMANDS = (
             partial(_filled, "domain", "domain"), page="domain"),
     Command("certificate", "where the paper's V jumps; limits of the control period",
             partial(_filled, "certificate", "jumps"), page="jumps"),
-    Command("hard", "hard cases: the error reached, and what others reach", _hard, (
+    Command("hard", "hard cases: the error reached, and what others reach", _study("hard", "docs", "alone"), (
         _asked("--alone", action="store_true", help="without other solvers, which takes a minute instead of ten"),
     ), "hard"),
     Command("fuzz", "random scenes against all properties", _fuzz, (
@@ -199,7 +186,7 @@ COMMANDS = (
                 Path("runs") / "fuzz"),
     ), "fuzz"),
     Command("accuracy", "what accuracy costs: error against time of every method, energy, prediction, control periods;"
-            " resumes", partial(_resumed, "accuracy_page"), RESUMED, "accuracy"),
+            " resumes", _study("accuracy_page", "docs", "output", "quick"), RESUMED, "accuracy"),
     Command("derivatives", "derivatives through impacts beside the reference, which takes hours and resumes, random"
             " scenes, and peers", _derivatives, (
                 _asked("--table", dest="tables", action="append", choices=("reference", "random", "peers", "cost"),
@@ -207,10 +194,10 @@ COMMANDS = (
                 _asked("--draws", type=whole(1), default=300, metavar="N", help="random scenes (default 300)"),
                 JOURNAL,
             ), "derivatives"),
-    Command("effects", "what each effect costs: counts of work, times, bytes", _effects,
-            page="costs"),
-    Command("maps", "where a grasp settles, and how robust it is; resumes", partial(_resumed, "map_page"), RESUMED,
-            "maps"),
+    Command("effects", "what each effect costs: counts of work, times, bytes",
+            _study("effects", "docs"), page="costs"),
+    Command("maps", "where a grasp settles, and how robust it is; resumes",
+            _study("map_page", "docs", "output", "quick"), RESUMED, "maps"),
     Command("recorder", "recordings are killed: what is left in their bags", partial(_repeated, "recorder"), (
         add_scene, SEED,
         _asked("--kills", dest="times", type=whole(0), default=10, metavar="N", help="how many (default 10)"),

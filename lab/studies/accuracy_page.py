@@ -34,13 +34,13 @@ QUICK_S = 5.0
 QUICK_DRIFT = {EXACT: 1e-16, "paper": 1e-3, "discrete_gradient": 1e-3}
 
 
-def write(docs: Path, directory: Path, quick: bool) -> None:
+def run(docs: Path | None, directory: Path, quick: bool) -> None:
     """Run all studies, as far as the journal does not have them, and write the page.
 
     Parameters
     ----------
-    docs : Path
-        Directory of the page; figures and records go to `accuracy` in it.
+    docs : Path, optional
+        Directory of the page, default that of the journal; figures and records go to `accuracy` in it.
     directory : Path
         The journal.
     quick : bool
@@ -51,6 +51,7 @@ def write(docs: Path, directory: Path, quick: bool) -> None:
     Refused
         If a directory cannot be written.
     """
+    docs = docs or directory
     place = docs / "accuracy"
     with writing(place):
         place.mkdir(parents=True, exist_ok=True)

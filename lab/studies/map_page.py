@@ -19,7 +19,7 @@ OUTCOMES = ("touches_left", "touches_right", "peak_input_left", "peak_input_righ
             "peak_impact_right")
 
 
-def write(docs: Path, directory: Path, quick: bool) -> None:
+def run(docs: Path | None, directory: Path, quick: bool) -> None:
     """Compute what is not there yet, and write the page with its pictures.
 
     Raises
@@ -27,6 +27,7 @@ def write(docs: Path, directory: Path, quick: bool) -> None:
     Refused
         If a directory cannot be written.
     """
+    docs = docs or directory
     place = docs / "maps"
     with writing(place):
         place.mkdir(parents=True, exist_ok=True)
