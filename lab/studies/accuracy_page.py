@@ -78,18 +78,18 @@ def run(docs: Path | None, directory: Path, quick: bool) -> None:
         docs, "accuracy", metric=accuracy.METRIC, points=simulation.GRID_POINTS, **accuracy_rows.by_error(records),
         drift=accuracy_rows.drift(drifts), prediction=accuracy_rows.prediction(predictions),
         topics=accuracy_rows.topics(case.title, points, limits),
-        profiles=accuracy_rows.profiles(_profiles(subjects, records)),
+        profiles=_profiles(subjects, records),
         last=None if quick else accuracy_rows.last_state(_final_states(subjects, directory)),
     )
 
 
-def _profiles(subjects: Sequence[Scene], records: Sequence[Record]) -> list[profile.Profile]:
+def _profiles(subjects: Sequence[Scene], records: Sequence[Record]) -> list[list[str]]:
     """Where the time of `exact` goes, at its fastest setting for the error; its finest where that is not reached."""
     found = []
     for scene in subjects:
         own = [record for record in records if (record.scene, record.method) == (scene.name, EXACT)]
         first = fastest(own, accuracy_rows.ERROR)
-        found.append(profile.profile(scene, METHODS[EXACT].default if first is None else first.setting))
+        found.append(profile.row(scene, METHODS[EXACT].default if first is None else first.setting))
     return found
 
 

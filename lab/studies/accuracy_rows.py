@@ -14,7 +14,6 @@ from grasp_ros.methods.registry import EXACT, METHODS
 from lab.studies import accuracy, predictability
 from lab.studies.drift import Drift
 from lab.studies.loop import Point
-from lab.studies.profile import Profile
 from lab.studies.records import by_scene, milliseconds
 from lab.studies.speed import Timing
 from lab.studies.stability import Limit
@@ -128,16 +127,6 @@ def topics(title: str, points: Sequence[Point], limits: Sequence[Limit]) -> dict
         growth = ", ".join(f"{g:.5f} at {1e3 * h:.2f} ms" for h, g in limit.checks)
         edges.append([f"{limit.delay} periods", f"{1e3 * limit.period:.10g} ms", growth])
     return {"scene": title, "rows": rows, "order": order, "limits": edges}
-
-
-def profiles(found: Sequence[Profile]) -> list[list[str]]:
-    """Where the time of `exact` goes."""
-    rows = []
-    for p in found:
-        shares = [p.call - p.outputs, p.outputs - p.end, p.expansions, p.end - p.expansions]
-        rows.append([p.scene, f"{p.accuracy:.0e}", f"{1e3 * p.call:.3g} ms", *(f"{s / p.call:.0%}" for s in shares),
-                     f"{p.contact_steps}, with one side of order {p.order}, {1e9 * p.expansion:.0f} ns each"])
-    return rows
 
 
 def last_state(timings: dict[str, list[Timing | None]]) -> dict[str, Any]:

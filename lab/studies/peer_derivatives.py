@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from functools import partial
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import mpmath
@@ -21,6 +21,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import compose
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.differentiate import differentiate
+from lab.oracles.closed_forms import impact
 from lab.studies import pages
 
 PACKAGES = "diffrax", "jax", "mujoco", "optimistix", "torch", "torchdiffeq"  # the extra `peers`
@@ -45,14 +46,12 @@ class Row(NamedTuple):
     seconds: float
 
 
+@cache
 def exact() -> tuple[float, Array]:
     """Exit speed, and its derivatives by p, v, H."""
-    with mpmath.workdps(30):
-        p, v = mpmath.mpf(LOSS), mpmath.mpf(SPEED)
-        z = p * v
-        w = 1 + mpmath.lambertw(-(1 + z) * mpmath.exp(-(1 + z))).real
-        slope = z * (1 - w) / (w * (1 + z))
-        return float(w / p), np.array([float((slope * v - w / p) / p), float(slope), 0.0])
+    p, v, e = mpmath.mpf(LOSS), mpmath.mpf(SPEED), impact(REDUCED, HERTZ, LOSS, SPEED).restitution
+    slope = (1 - p * v * e) / (e * (1 + p * v))
+    return float(e * v), np.array([float((slope - e) * v / p), float(slope), 0.0])
 
 
 def run() -> list[Row]:
