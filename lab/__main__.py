@@ -5,15 +5,11 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from functools import partial
 
 from grasp_ros.cli.main import run
-from grasp_ros.cli.parser import Command, Parser
-from grasp_ros.physics.errors import Refused
+from grasp_ros.cli.parser import Parser
 from lab.commands import COMMANDS
 
-# names of modules of the extra `lab`
-PACKAGES = ("gmpy2", "heyoka", "jinja2", "mpmath", "ruamel", "scipy", "sksundae", "xarray", "zarr")
 ABOUT = "Measure, and print what was measured. Those with --docs write a page; `make study` writes all pages."
 
 
@@ -27,19 +23,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = Parser(prog=program, usage=f"{program} NAME [options]", description=ABOUT)
     names = parser.add_subparsers(prog=program, title="studies", required=True, metavar="name")
     for command in COMMANDS:
-        sub = command.add(names)
-        sub.set_defaults(command=partial(with_packages, sub.get_default("command")))
+        command.add(names)
     return parser
-
-
-def with_packages(command: Command, options: argparse.Namespace) -> int:
-    """Run a command; a package of the laboratory that is missing is refused by its name."""
-    try:
-        return command(options)
-    except ModuleNotFoundError as error:
-        if str(error.name).split(".")[0] not in PACKAGES:
-            raise
-        raise Refused(f"this needs {error.name}; run `make laboratory`") from None
 
 
 if __name__ == "__main__":

@@ -34,14 +34,13 @@ class Command(NamedTuple):
     asked: tuple[Option, ...] = ()
     page: str = ""
 
-    def add(self, commands: Any) -> argparse.ArgumentParser:
+    def add(self, commands: Any) -> None:
         """Add its parser to those of the program."""
         sub = add_command(commands, self.name, self._run, self.text)
         for add in self.asked:
             add(sub)
         if self.page:
             sub.add_argument("--docs", type=Path, metavar="DIRECTORY", help="write the page there as well")
-        return sub
 
     def _run(self, options: Options) -> int:
         if self.page and options.docs is not None:
@@ -61,35 +60,18 @@ def _output(metavar: str, text: str, default: Path) -> Option:
 
 def _paper(options: Options) -> int:
     from lab.paper import page, study
-    from lab.paper.definitions import RANDOM_STARTS
     from lab.studies import pages
 
     pages.claim(options.output)
     prepare()
-    found = study.report(QUICK_STARTS if options.quick else RANDOM_STARTS)
-    page.write_html(found, options.output)
+    found = study.report(QUICK_STARTS if options.quick else study.RANDOM_STARTS)
     print(page.summary(found.claims))
     for claim in found.claims:
         print(f"  {claim.key:4} {claim.verdict.value:27} {claim.statement}")
-    print(f"written to {options.output}")
+    page.write_html(found, options.output)
     if options.docs is not None:
         page.write_markdown(found, options.docs / "paper.md")
-        print(f"written to {options.docs / 'paper.md'}")
     return 0
-
-
-def _domain(options: Options) -> int:
-    from lab.studies import domain
-
-    domain.run(options.docs)
-    return 0
-
-
-def _hard(options: Options) -> int:
-    from lab.studies import hard
-
-    prepare()
-    return hard.run(options.docs, alone=options.alone)
 
 
 def _fuzz(options: Options) -> int:
@@ -127,19 +109,23 @@ def _readers(options: Options) -> int:
     return 1 if broken else 0
 
 
-def _resumed(module: str, options: Options) -> int:
-    """A study that goes on from what it has measured, and whose result is its page."""
-    study = import_module(f"lab.studies.{module}")
-    prepare()
-    print(f"written to {study.write(options.docs or options.output, options.output, options.quick)}")
-    return 0
+def _study(module: str, *asked: str) -> Callable[[Options], int]:
+    """A study that is asked some of the options; it may return an exit status."""
+    def run(options: Options) -> int:
+        study = import_module(f"lab.studies.{module}")
+        prepare()
+        return study.run(*(getattr(options, name) for name in asked)) or 0
+
+    return run
 
 
-def _printed(module: str, options: Options) -> int:
-    """A study that prints its numbers, and writes its page where one is wanted."""
+def _filled(module: str, page: str, options: Options) -> int:
+    """A study that has the numbers of a page, which is printed or written."""
+    from lab.studies import pages
+
     study = import_module(f"lab.studies.{module}")
     prepare()
-    study.run(options.docs)
+    pages.write(options.docs, page, **study.numbers())
     return 0
 
 
@@ -151,24 +137,16 @@ def _derivatives(options: Options) -> int:
     found = derivatives.tables(wanted, options.output, options.draws)
     print("\n\n".join(found.values()))
     if options.docs is not None:
-        print(f"written to {derivatives.write(options.docs, found)}")
+        derivatives.write(options.docs, found)
     return 0
 
 
-def _steering(options: Options) -> int:
-    from lab.drills import steering
-
+def _repeated(module: str, options: Options) -> int:
+    """A drill that does the same to runs of one scene so many times."""
+    drill = import_module(f"lab.drills.{module}")
     scene = load_scene(options.scene, options.settings)
     prepare()
-    return 0 if steering.run(scene, options.calls, options.seed) else 1
-
-
-def _recorder(options: Options) -> int:
-    from lab.drills import recorder
-
-    scene = load_scene(options.scene, options.settings)
-    prepare()
-    return 0 if recorder.run(scene, options.kills, options.seed) else 1
+    return 0 if drill.run(scene, options.times, options.seed) else 1
 
 
 def _faults(options: Options) -> int:
@@ -193,10 +171,11 @@ COMMANDS = (
         _asked("--quick", action="store_true", help=f"{QUICK_STARTS} random starts: to try it out"),
         _output("FILE.html", "the page, in one file", PAPER_PAGE),
     ), "paper"),
-    Command("domain", "which scenes are simulated: every bound and its reason", _domain, page="domain"),
-    Command("certificate", "where the paper's V jumps; limits of the control period", partial(_printed, "certificate"),
-            page="jumps"),
-    Command("hard", "hard cases: the error reached, and what others reach", _hard, (
+    Command("domain", "which scenes are simulated: every bound and its reason",
+            partial(_filled, "domain", "domain"), page="domain"),
+    Command("certificate", "where the paper's V jumps; limits of the control period",
+            partial(_filled, "certificate", "jumps"), page="jumps"),
+    Command("hard", "hard cases: the error reached, and what others reach", _study("hard", "docs", "alone"), (
         _asked("--alone", action="store_true", help="without other solvers, which takes a minute instead of ten"),
     ), "hard"),
     Command("fuzz", "random scenes against all properties", _fuzz, (
@@ -207,7 +186,7 @@ COMMANDS = (
                 Path("runs") / "fuzz"),
     ), "fuzz"),
     Command("accuracy", "what accuracy costs: error against time of every method, energy, prediction, control periods;"
-            " resumes", partial(_resumed, "accuracy_page"), RESUMED, "accuracy"),
+            " resumes", _study("accuracy_page", "docs", "output", "quick"), RESUMED, "accuracy"),
     Command("derivatives", "derivatives through impacts beside the reference, which takes hours and resumes, random"
             " scenes, and peers", _derivatives, (
                 _asked("--table", dest="tables", action="append", choices=("reference", "random", "peers", "cost"),
@@ -215,16 +194,17 @@ COMMANDS = (
                 _asked("--draws", type=whole(1), default=300, metavar="N", help="random scenes (default 300)"),
                 JOURNAL,
             ), "derivatives"),
-    Command("effects", "what each effect costs: counts of work, times, bytes", partial(_printed, "effects"),
-            page="costs"),
-    Command("maps", "where a grasp settles, and how robust it is; resumes", partial(_resumed, "map_page"), RESUMED,
-            "maps"),
-    Command("recorder", "recordings are killed: what is left in their bags", _recorder, (
-        add_scene, _asked("--kills", type=whole(0), default=10, metavar="N", help="how many recordings (default 10)"),
-        SEED,
+    Command("effects", "what each effect costs: counts of work, times, bytes",
+            _study("effects", "docs"), page="costs"),
+    Command("maps", "where a grasp settles, and how robust it is; resumes",
+            _study("map_page", "docs", "output", "quick"), RESUMED, "maps"),
+    Command("recorder", "recordings are killed: what is left in their bags", partial(_repeated, "recorder"), (
+        add_scene, SEED,
+        _asked("--kills", dest="times", type=whole(0), default=10, metavar="N", help="how many (default 10)"),
     )),
-    Command("steering", "random pause, step, resume and reset calls, each checked", _steering, (
-        add_scene, _asked("--calls", type=whole(1), default=1000, metavar="N", help="how many (default 1000)"), SEED,
+    Command("steering", "random pause, step, resume and reset calls, each checked", partial(_repeated, "steering"), (
+        add_scene, SEED,
+        _asked("--calls", dest="times", type=whole(1), default=1000, metavar="N", help="how many (default 1000)"),
     )),
     Command("faults", "accidents done to graphs of real processes, some minutes", _faults, (
         _asked("--only", nargs="+", default=[], metavar="NAME", help="these drills alone"),

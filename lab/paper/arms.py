@@ -71,6 +71,11 @@ class Damped(NamedTuple):
         """Standard error of that share."""
         return float((self.later * (1.0 - self.later) / self.starts) ** 0.5)
 
+    @property
+    def slower(self) -> bool:
+        """Whether damped arms settle later with the object in most starts, by two standard errors."""
+        return self.C > 0.0 and self.later - 2.0 * self.error > 0.5
+
 
 def damped(cases: Cases, starts: Sequence[Start]) -> list[Damped]:
     """Settling time with and without the object, over the damping of the arms."""

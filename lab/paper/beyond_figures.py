@@ -53,7 +53,6 @@ def gap(found: Gap) -> Drawing:
         bottom.set(ylim=(-1.6, 0.6), xlabel="time, s")
         for axes in (top, bottom):
             shade_contacts(axes, run)
-            axes.grid(alpha=0.25)
             axes.set_xlim(0.0, run.t[-1])
     panels[0, 0].set_ylabel("twice the energy, J")
     panels[1, 0].set_ylabel("$p\\,\\dot u$")
@@ -78,7 +77,6 @@ def tail(found: Tail) -> Drawing:
     right.set_ylabel("touches")
     for axes in (left, right):
         axes.set_xlabel("time, s")
-        axes.grid(alpha=0.25)
         axes.legend(frameon=False, loc="lower left" if axes is left else "upper left")
     return figure
 
@@ -96,8 +94,6 @@ def chaos(found: Chaos) -> Drawing:
     )
     right.set(xlabel="time, s", ylabel="sum of log stretching")
     right.legend(frameon=False, loc="upper left")
-    for axes in (left, right):
-        axes.grid(alpha=0.25)
     return figure
 
 
@@ -120,7 +116,6 @@ def stiffer(rows: Sequence[Stiffer]) -> Drawing:
         axes.set_ylabel(label)
         axes.set_ylim(bottom=0.0)
         axes.set_xscale("log")
-        axes.grid(alpha=0.25)
     for axes in panels[1]:
         axes.set_xlabel("stiffness k of both arms, N/m")
     return figure
@@ -142,7 +137,6 @@ def damped(rows: Sequence[Damped]) -> Drawing:
                 label="with the object, C = 0",
             )
     axes.set(xlabel="damping C = c + Kv of both arms, N s/m", ylabel="settling time, s")
-    axes.grid(alpha=0.25)
     axes.legend(frameon=False)
     return figure
 
@@ -167,7 +161,6 @@ def stepped(cases: Mapping[int, Scene], numbers: Sequence[int] = (1, 2)) -> Draw
             bottom.set_yscale("log")
         bottom.set_xlabel("time, s")
         for axes in (top, bottom):
-            axes.grid(alpha=0.25)
             axes.set_xlim(0.0, scene.duration)
     panels[0, 0].set_ylabel("$x_o$, m")
     panels[1, 0].set_ylabel("$V_c$, J")
@@ -188,8 +181,6 @@ def edge(rows: Sequence[Edge]) -> Drawing:
     right.set_yscale("log")
     right.set_xticks(range(len(MOVED)), [f"{offset:g}" for offset in MOVED])
     right.set(xlabel="offset of $x_l(0)$, m", ylabel="settling time, s")
-    for axes in (left, right):
-        axes.grid(alpha=0.25)
     figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=len(rows), frameon=False)
     return figure
 
@@ -258,3 +249,4 @@ def _sweep(axes: Axes, each: Curve) -> None:
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter("{x:g}")
     axes.minorticks_off()
+    axes.grid(visible=False)

@@ -12,6 +12,7 @@ import numpy as np
 
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
+from lab.paper.cases import value_of
 
 
 class Side(NamedTuple):
@@ -28,11 +29,13 @@ class Side(NamedTuple):
 
 def side_of(scene: Scene, name: str) -> Side:
     """The numbers of the left or the right side."""
-    arm, loop, contact = (scene.values[f"{name}_{part}"] for part in ("arm", "feedback", "contact"))
-    return Side(
-        arm["mass_kg"], arm["stiffness_N_per_m"], arm["damping_Ns_per_m"], loop["position_gain_N_per_m"],
-        loop["velocity_gain_Ns_per_m"], contact["hertz_N_per_m1_5"], contact["dissipation_s_per_m"],
-    )
+    return Side(*(value_of(scene, f"{letter}_{name[0]}") for letter in Side._fields))
+
+
+def pairs(scene: Scene, y: Array) -> tuple[tuple[Side, float, float], tuple[Side, float, float]]:
+    """Left and right side at one state (6,), each with its u and u' of (8)."""
+    x_l, v_l, x_o, v_o, x_r, v_r = y.tolist()
+    return (side_of(scene, "left"), x_l - x_o, v_l - v_o), (side_of(scene, "right"), x_o - x_r, v_o - v_r)
 
 
 def touching(side: Side, u: float, rate: float) -> bool:
@@ -42,11 +45,8 @@ def touching(side: Side, u: float, rate: float) -> bool:
 
 def matrix(scene: Scene, y: Array) -> Array:
     """(12) at one state (6,), entry by entry, with (14), (15)."""
-    left, right, m_o = side_of(scene, "left"), side_of(scene, "right"), float(scene.values["object"]["mass_kg"])
-    x_l, v_l, x_o, v_o, x_r, v_r = y.tolist()
-    u_l, u_r = x_l - x_o, x_o - x_r
-    k_l = 4.0 / 5.0 * left.H * u_l**0.5 if touching(left, u_l, v_l - v_o) else 0.0
-    k_r = 4.0 / 5.0 * right.H * u_r**0.5 if touching(right, u_r, v_o - v_r) else 0.0
+    left, right, m_o = side_of(scene, "left"), side_of(scene, "right"), value_of(scene, "m_o")
+    k_l, k_r = (4.0 / 5.0 * side.H * u**0.5 if touching(side, u, d) else 0.0 for side, u, d in pairs(scene, y))
     return np.array(
         [
             [left.k + left.Kp + k_l, 0.0, -k_l, 0.0, 0.0, 0.0],
@@ -66,7 +66,7 @@ def parts(scene: Scene, y: Array) -> Array:
     return np.array(
         [
             (left.k + left.Kp) * x_l**2 + left.m * v_l**2,
-            scene.values["object"]["mass_kg"] * v_o**2,
+            value_of(scene, "m_o") * v_o**2,
             (right.k + right.Kp) * x_r**2 + right.m * v_r**2,
         ]
     )
@@ -74,23 +74,19 @@ def parts(scene: Scene, y: Array) -> Array:
 
 def level(scene: Scene, y: Array) -> float:
     """(16), (21) or (28) at one state, whichever its condition of contact asks for, in J."""
-    left, right = side_of(scene, "left"), side_of(scene, "right")
-    x_l, v_l, x_o, v_o, x_r, v_r = y.tolist()
     total = float(parts(scene, y).sum())
-    if touching(left, x_l - x_o, v_l - v_o):
-        total += 4.0 / 5.0 * left.H * (x_l - x_o) ** 2.5
-    if touching(right, x_o - x_r, v_o - v_r):
-        total += 4.0 / 5.0 * right.H * (x_o - x_r) ** 2.5
+    for side, u, d in pairs(scene, y):
+        if touching(side, u, d):
+            total += 4.0 / 5.0 * side.H * u**2.5
     return total
 
 
 def rate(scene: Scene, y: Array) -> float:
     """(18) or (23) with a = b = 4/5, or the sum of (31), (32) and (34), at one state, in W."""
     left, right = side_of(scene, "left"), side_of(scene, "right")
-    x_l, v_l, x_o, v_o, x_r, v_r = y.tolist()
+    _, v_l, _, _, _, v_r = y.tolist()
     total = -2.0 * (left.c + left.Kv) * v_l**2 - 2.0 * (right.c + right.Kv) * v_r**2
-    if touching(left, x_l - x_o, v_l - v_o):
-        total -= 2.0 * left.p * left.H * (x_l - x_o) ** 1.5 * (v_l - v_o) ** 2
-    if touching(right, x_o - x_r, v_o - v_r):
-        total -= 2.0 * right.p * right.H * (x_o - x_r) ** 1.5 * (v_o - v_r) ** 2
+    for side, u, d in pairs(scene, y):
+        if touching(side, u, d):
+            total -= 2.0 * side.p * side.H * u**1.5 * d**2
     return float(total)

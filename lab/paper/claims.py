@@ -183,8 +183,3 @@ def tally(claims: Sequence[Claim]) -> list[str]:
 def _first(texts: Sequence[str], whole: int) -> str:
     """The first of so many."""
     return texts[0] + (f", and {whole - 1} more" if whole > 1 else "")
-
-
-def almost_all(share: float) -> bool:
-    """Whether a share of random starts counts as all."""
-    return share >= ALMOST_ALL

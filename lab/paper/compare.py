@@ -9,7 +9,7 @@ import numpy as np
 
 from grasp_ros.scene import Scene
 from lab.paper.cases import ALIKE, STANDARD, Cases, Start, read_starts, start_of, started, value_of, with_values
-from lab.paper.claims import HALF, Check, Kind, Part, almost_all
+from lab.paper.claims import ALMOST_ALL, HALF, Check, Kind, Part
 from lab.paper.measures import MARGIN, MEASURES, near, over, ratio, seconds
 from lab.paper.scatter import Median, median
 from lab.paper.symmetry import where_false
@@ -87,7 +87,7 @@ class Comparison(NamedTuple):
             true = [self.true_of(found, 1.0) for found in _ratios(cases, starts, self.measure, pair)]
             text = f"by whatever amount, {_words(pair)}, random starts"
             share = sum(true) / len(true)
-            checks.append(Check(Kind.WORD, text, f"{_percent(share)} of {len(true)}", share, almost_all(share)))
+            checks.append(Check(Kind.WORD, text, f"{_percent(share)} of {len(true)}", share, share >= ALMOST_ALL))
         checks += [self._random(cases, starts, word, self.decisive[0]) for word in self.words]
         return Part(self.statement, self.threshold, self.why, checks, self.reading, curve)
 
@@ -112,7 +112,7 @@ class Comparison(NamedTuple):
         value = f"{_percent(share)} of {len(found)}; ratio {middle:.3g}, from {low:.3g} to {high:.3g}"
         if kind is Kind.RANDOM:
             value += where_false(starts, true)
-        return Check(kind, f"{MEASURES[word].name}, {_words(pair)}", value, share, almost_all(share), len(found))
+        return Check(kind, f"{MEASURES[word].name}, {_words(pair)}", value, share, share >= ALMOST_ALL, len(found))
 
     def _sweep(self, cases: Cases, starts: Sequence[Start], curve: Sequence[tuple[float, Median]]) -> list[Check]:
         """The parameter alone, changed from the other case, at several values: the median over the random starts.

@@ -89,8 +89,3 @@ EQUATIONS = {row.number: row for row in (
     Equation("(37)", "x_l - eps_l < x_o < x_r + eps_r", _BOUND, "smallest clearance, eps from V_c(0), m", 0.0,
              margin=True),
 )}
-
-
-def rows(found: dict[str, float]) -> list[Equation]:
-    """The rows with the numbers that were found, by number."""
-    return [row._replace(number=key.split()[0], found=found[key]) for key, row in EQUATIONS.items()]

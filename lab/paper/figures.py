@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,7 +22,7 @@ from grasp_ros.simulation.losses import Losses, losses
 from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, legend_beside, shade_contacts
 from grasp_ros.simulation.quantities import contact_intervals, settling_times
 from grasp_ros.simulation.repeat import integrator_of
-from lab.paper.cases import STANDARD, Figure, Start, start_of, started
+from lab.paper.cases import FIGURES, STANDARD, Cases, Figure, start_of, started
 from lab.paper.prints import PAPER_DISPLACEMENT, PAPER_INPUT
 
 CAUSES = (("dampers", "#56b4e9"), ("feedback", "#e69f00"), ("impacts", "#009e73"), ("friction", "#999999"))
@@ -33,23 +33,8 @@ IN_CONTACT = 60  # output times in each contact, so that no peak is cut
 PAGE = 170.0 / 25.4  # in, the width of a page in print
 STYLE = {  # letters and lines there
     "font.size": 7.0, "axes.titlepad": 3.0, "axes.labelpad": 2.0, "axes.linewidth": 0.6, "lines.linewidth": 0.9,
+    "axes.grid": True, "grid.alpha": 0.25,
 }
-
-
-class Pictured(NamedTuple):
-    """A case with what its figure needs."""
-
-    figure: Figure
-    run: Trajectory
-    beside: Trajectory | None  # the standard case from the same start; None for the standard case itself
-
-
-def pictured(figure: Figure, cases: Mapping[int, Scene]) -> Pictured:
-    """Simulate a case, and the standard one from the same start."""
-    scene = cases[figure.case]
-    start: Start = start_of(scene)
-    beside = None if figure.case == STANDARD else simulate(started(cases[STANDARD], start))
-    return Pictured(figure, _fine(scene), beside)
 
 
 def _fine(scene: Scene) -> Trajectory:
@@ -61,25 +46,23 @@ def _fine(scene: Scene) -> Trajectory:
 
 
 @canvas.style(STYLE)
-def sheet(several: Sequence[Pictured]) -> Drawing:
+def sheet(cases: Cases) -> Drawing:
     """All eleven in the layout of the paper: displacements above, inputs below."""
     figure: Drawing = canvas.figure(figsize=(PAGE, 8.9), layout="constrained")
     cells: Any = figure.subfigures(4, 3, wspace=0.02, hspace=0.02)
     cells = cells.ravel()
-    for cell, each in zip(cells, several, strict=False):
+    for cell, each in zip(cells, FIGURES, strict=False):
         top, bottom = cell.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        _on_its_axis(plots.displacements, top, each.run)
-        _on_its_axis(plots.inputs, bottom, each.run)
+        run = _fine(cases[each.case])
+        _on_its_axis(plots.displacements, top, run)
+        _on_its_axis(plots.inputs, bottom, run)
         for axes in (top, bottom):
-            shade_contacts(axes, each.run)
-            axes.grid(alpha=0.25)
-            axes.set_xlim(0.0, each.run.scene.duration)
-        top.set_title(
-            _math(f"Fig. {each.figure.number}  {each.figure.change or 'standard'}"), fontsize="small", loc="left"
-        )
+            shade_contacts(axes, run)
+            axes.set_xlim(0.0, run.scene.duration)
+        top.set_title(_math(f"Fig. {each.number}  {each.change or 'standard'}"), fontsize="small", loc="left")
         top.set_ylabel("displacement, m")
         bottom.set(ylabel="input, N", xlabel="time, s")
-    for cell in cells[len(several) :]:
+    for cell in cells[len(FIGURES) :]:
         _key(cell.subplots())
     return figure
 
@@ -116,36 +99,38 @@ def _key(axes: Axes) -> None:
 
 
 @canvas.style(STYLE)
-def large(each: Pictured) -> Drawing:
-    """One case: the paper's two panels, and below them what it does not draw; one contact and the losses beside."""
+def large(each: Figure, cases: Cases) -> Drawing:
+    """One case: the paper's two panels, and below them what it does not draw; one contact and the losses beside.
+
+    The standard case from the same start is pale behind it.
+    """
+    own = _fine(cases[each.case])
+    beside = None if each.case == STANDARD else simulate(started(cases[STANDARD], start_of(own.scene)))
     figure: Drawing = canvas.figure(figsize=(PAGE, 6.9), layout="constrained")
     halves: Any = figure.subfigures(1, 2, width_ratios=(3.1, 1.0))
     wide, narrow = halves
     left = wide.subplots(5, 1, sharex=True, height_ratios=(3, 2, 2, 2, 2))
     for axes, panel in zip(left, plots.PANELS.values(), strict=False):
         draw = partial(_on_its_axis, panel.draw)
-        if each.beside is not None:
-            _behind(axes, draw, each.beside)
-        draw(axes, each.run)
+        if beside is not None:
+            _behind(axes, draw, beside)
+        draw(axes, own)
         axes.set_ylabel(panel.label)
-    _losses(left[4], each.run)
-    for run in filter(None, (each.run, each.beside)):
-        settled, own = float(settling_times(run).max()), run is each.run
-        if settled <= run.scene.duration:
-            left[0].axvline(settled, color="black", linestyle="-.", alpha=1.0 if own else PALE,
-                            label=f"settled, {SETTLED:.0%}" if own else "_")
+    _losses(left[4], own)
+    for run, alpha, label in ((own, 1.0, f"settled, {SETTLED:.0%}"), (beside, PALE, "_")):
+        if run is not None and (settled := float(settling_times(run).max())) <= run.scene.duration:
+            left[0].axvline(settled, color="black", linestyle="-.", alpha=alpha, label=label)
     for axes in left:
-        shade_contacts(axes, each.run)
-        axes.grid(alpha=0.25)
-        axes.set_xlim(0.0, each.run.scene.duration)
+        shade_contacts(axes, own)
+        axes.set_xlim(0.0, own.scene.duration)
         legend_beside(axes)
     left[-1].set_xlabel("time, s")
-    if each.beside is not None:
+    if beside is not None:
         left[0].set_title("pale: No. 1 from the same start", fontsize="small", loc="right")
-    left[0].set_title(_math(each.figure.title), fontsize="medium", loc="left")
+    left[0].set_title(_math(each.title), fontsize="medium", loc="left")
     force, depth, bars = narrow.subplots(3, 1)
-    _one_contact((force, depth), each.run)
-    _bars(bars, each.run)
+    _one_contact((force, depth), own)
+    _bars(bars, own)
     wide.align_ylabels(left)
     return figure
 
@@ -155,9 +140,8 @@ def _math(text: str) -> str:
     return re.sub(r"\b([A-Za-z]+)_([lro])\b", r"$\1_\2$", text)
 
 
-def _behind(axes: Axes, draw: object, run: Trajectory) -> None:
+def _behind(axes: Axes, draw: Callable[[Axes, Trajectory], None], run: Trajectory) -> None:
     """Draw another run pale and without labels."""
-    assert callable(draw)
     before = len(axes.lines)
     draw(axes, run)
     for line in axes.lines[before:]:
@@ -213,8 +197,6 @@ def _one_contact(panels: Sequence[Axes], run: Trajectory) -> None:
     panels[0].set(xlabel=f"ms after {span[0]:.3f} s", ylabel="impact force, N")
     panels[0].set_title("one contact", fontsize="small")
     panels[1].set(xlabel="deformation u, mm", ylabel="impact force, N")
-    for axes in panels:
-        axes.grid(alpha=0.25)
 
 
 def _hardest(run: Trajectory) -> tuple[float, float] | None:
@@ -235,6 +217,7 @@ def _bars(axes: Axes, run: Trajectory) -> None:
     shown = [(name, color, 100.0 * float(getattr(lost, name)) / whole) for name, color in CAUSES]
     shown = [each for each in shown if each[2] > 1e-6]
     axes.set_title("% of what was lost", fontsize="small")
+    axes.grid(visible=False)
     if not shown:
         axes.text(0.5, 0.5, "nothing is lost", ha="center", va="center", transform=axes.transAxes)
         axes.set_axis_off()

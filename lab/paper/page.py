@@ -4,29 +4,37 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import jinja2
 from markupsafe import Markup
+from ruamel.yaml import YAML
 
 from grasp_ros.scene.files import writing
 from grasp_ros.scene.versions import versions
-from lab.paper.answer import FIGURE, answer
-from lab.paper.claims import Claim, Verdict, tally
-from lab.paper.definitions import PRINTS, SUBTITLE, SWEEPS, TITLE, definitions
-from lab.paper.equation_table import ALGEBRA, Equation
+from lab.paper import arms, beyond, cases, claims, equation_table, knife_edge, measures, scatter, universal
+from lab.paper.claims import Claim, Kind, Verdict, tally
+from lab.paper.doubts import Doubts
+from lab.paper.equation_table import Equation
 from lab.paper.equations import CROSSING
 from lab.paper.printed import PRINTED
 from lab.paper.prints import Compared
-from lab.paper.results import Beyond, results
+from lab.paper.results import Beyond, tables
 from lab.studies import pages
 
 Row = tuple[str, ...]
 FIGURES = "paper"  # directory of the figures beside the Markdown page
+NUMBERED = "O", "C"  # letters of the claims that the paper numbers
+WORDS = {  # what `words.yaml` names beside the fields of a report
+    "math": math, "arms": arms, "beyond": beyond, "cases": cases, "edge": knife_edge, "measures": measures,
+    "rule": claims, "scatter": scatter, "table": equation_table, "universal": universal, "kinds": Kind,
+    "verdicts": Verdict, "steps": arms.STEPS, "never": math.inf, "crossing": CROSSING, "tally": tally,
+}
 SIGNS = {Verdict.HOLDS: "\u2713", Verdict.LIMITED: "~", Verdict.FAILS: "\u2717"}  # so that no verdict needs a colour
 
 
@@ -49,7 +57,7 @@ class Report(NamedTuple):
     quantities: tuple[Row, Sequence[Row]]
     equations: Sequence[Equation]
     found: Beyond
-    doubts: Mapping[str, str]
+    doubts: Doubts
     replays: Sequence[dict[str, Any]]
     images: Mapping[str, bytes]  # PNG
 
@@ -93,17 +101,27 @@ def _template(name: str) -> str:
 
 
 def _render(name: str, report: Report, *, autoescape: bool, **more: object) -> str:
-    """A template with what both pages say."""
-    environment = jinja2.Environment(autoescape=autoescape, undefined=jinja2.StrictUndefined)
     # by the words of a part, the key of the first statement that has it: it is told there
     told = {part.statement: claim.key for claim in reversed(report.claims) for part in claim.parts}
-    environment.filters |= {"cell": lambda text: text.replace("|", "\\|"), "told": told.__getitem__}
-    return environment.from_string(_template(name)).render(
-        report._asdict(), title=TITLE, subtitle=SUBTITLE, sweeps=SWEEPS, prints=PRINTS, printed=PRINTED, signs=SIGNS,
-        beside=FIGURE, told=told, answer=answer(report.claims, report.found), summary=summary(report.claims),
-        agreement=agreement(report.equations), results=results(report.found), definitions=definitions(report.starts),
+    filters = {"cell": lambda text: text.replace("|", "\\|"), "told": told.__getitem__}
+    return _filled(
+        name, filters, autoescape, **report._asdict() | words(report), printed=PRINTED, signs=SIGNS, told=told,
+        summary=summary(report.claims), tables=tables(report.found),
         origin="Computed with " + ", ".join(f"{name} {version}" for name, version in versions().items()) + ".", **more,
     )
+
+
+def words(report: Report) -> dict[str, Any]:
+    """What both pages say, by the keys of `words.yaml`."""
+    numbered = [claim for claim in report.claims if claim.key.startswith(NUMBERED)]
+    text = _filled("words.yaml", {"f": format}, False, **WORDS, numbered=numbered, **report._asdict())
+    return dict(YAML(typ="safe", pure=True).load(text))
+
+
+def _filled(name: str, filters: Mapping[str, Callable[..., object]], autoescape: bool, **numbers: object) -> str:
+    environment = jinja2.Environment(autoescape=autoescape, undefined=jinja2.StrictUndefined)
+    environment.filters |= filters
+    return environment.from_string(_template(name)).render(numbers)
 
 
 def summary(claims: Sequence[Claim]) -> str:
@@ -112,18 +130,6 @@ def summary(claims: Sequence[Claim]) -> str:
     return (
         f"Of {len(claims)} statements {holds}, {limited}, and {fails}. A statement holds as far as its weakest part"
         " does; the parts and their checks stand below."
-    )
-
-
-def agreement(rows: Sequence[Equation]) -> str:
-    """How many equations agree."""
-    numbers = {row.number for row in rows}
-    return (
-        f"{len(numbers)} equations in {len(rows)} rows; {sum(row.agrees for row in rows)} of them agree."
-        f" {sum(row.by == ALGEBRA for row in rows)} compare two ways to write the same function: algebra, which wrong"
-        " code breaks and no motion does. The others are held against motions, differentiated to order 8 from the dense"
-        f" output: those of the eleven cases, and of the scenes {' and '.join(CROSSING)}, which cross the second"
-        " surface of (10), u' = -1/p with u > 0, as no case of the paper does."
     )
 
 

@@ -94,7 +94,6 @@ def _row(text: str) -> Markup:
 
 
 def _symbols(text: str) -> list[Markup]:
-    """The elements of a line."""
     found: list[Markup] = []
     for token in TOKEN.finditer(text):
         power = token["power"] or token["digit"]

@@ -7,13 +7,10 @@ import numpy as np
 from grasp_ros.physics.model import penetration
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.simulation import ensemble, simulate
-from grasp_ros.simulation.losses import losses
-from grasp_ros.simulation.quantities import contact_intervals, settled_distance, settling_times
+from grasp_ros.simulation import simulate
+from grasp_ros.simulation.quantities import contact_intervals, settled_distance, settling_times, summary
 from lab.paper.cases import OFFSETS, Cases, moved, start_of
 from lab.paper.measures import seconds
-
-PEAKS = ("peak_input", "peak_impact")
 
 
 def quantities(cases: Cases) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
@@ -25,17 +22,15 @@ def quantities(cases: Cases) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
 
 def _column(scene: Scene) -> dict[str, str]:
     run = simulate(scene)
-    level, lost = run.energy.V_c, losses(run)
+    found = summary(run)
+    (whole, last), largest, lost = found["V_c_J"], found["largest_N"], found["lost_J"]
     spans = [contact_intervals(run, side) for side in SIDES]
     ended = [span[span[:, 1] < run.t[-1]] for span in spans]
     lengths = np.concatenate([span[:, 1] - span[:, 0] for span in ended]) * 1e3
     u_l, _, u_r, _ = penetration(run.state[-1])
-    slope = float(np.polyfit(run.t, np.log(level), 1)[0])
-    whole = float(level[0])
+    slope = float(np.polyfit(run.t, np.log(run.energy.V_c), 1)[0])
     x_l, x_r, _ = start_of(scene)
     left, middle, right = _times(scene)
-    peaks = ensemble(scene, {}, PEAKS, threads=1).columns  # from the polynomials of the motion and not from a grid
-    largest = {peak: max(float(peaks[f"{peak}_{side}"][0]) for side in SIDES) for peak in PEAKS}
     return {
         "start x_l, x_r, m": f"{x_l:g}, {x_r:g}",
         "settled within, mm": f"{1e3 * settled_distance(scene):g}",
@@ -44,13 +39,13 @@ def _column(scene: Scene) -> dict[str, str]:
         "right, s": right,
         "contacts left, right": f"{len(spans[0])}, {len(spans[1])}",
         "contact time, ms": f"{lengths.min():.0f} to {lengths.max():.0f}",
-        "largest input, N": f"{largest['peak_input']:.2f}",
-        "largest impact force, N": f"{largest['peak_impact']:.2f}",
-        "V_c at 0 and 20 s, J": f"{whole:.3g}, {_plain(float(level[-1]))}",
-        "lost to dampers, % of V_c(0)": f"{200.0 * float(lost.dampers) / whole:.1f}",
-        "to feedback, % of V_c(0)": f"{200.0 * float(lost.feedback) / whole:.1f}",
-        "to impacts, % of V_c(0)": f"{200.0 * float(lost.impacts) / whole:.1f}",
-        "left at 20 s, % of V_c(0)": f"{100.0 * float(level[-1]) / whole:.1f}",
+        "largest input, N": f"{max(largest['input_left'], largest['input_right']):.2f}",
+        "largest impact force, N": f"{max(largest['impact_left'], largest['impact_right']):.2f}",
+        "V_c at 0 and 20 s, J": f"{whole:.3g}, {_plain(last)}",
+        "lost to dampers, % of V_c(0)": f"{200.0 * lost['dampers'] / whole:.1f}",
+        "to feedback, % of V_c(0)": f"{200.0 * lost['feedback'] / whole:.1f}",
+        "to impacts, % of V_c(0)": f"{200.0 * lost['impacts'] / whole:.1f}",
+        "left at 20 s, % of V_c(0)": f"{100.0 * last / whole:.1f}",
         "decay rate of V_c, 1/s": f"{round(-slope, 3) + 0.0:.3f}",
         "holding force at 20 s, N": f"{run.impacts[-1].min():.2g}",
         "gaps at 20 s, mm": f"{_plain(max(-1e3 * float(u_l), 0.0))}, {_plain(max(-1e3 * float(u_r), 0.0))}",

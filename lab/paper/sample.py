@@ -53,6 +53,11 @@ class Sample:
         """V differentiated."""
         return self.differentiated(energy(self.system, self.stencils).V)
 
+    @property
+    def fastest(self) -> float:
+        """The largest rate of V, W; 1 where V does not change."""
+        return float(np.abs(self.level.V_rate).max()) or 1.0
+
     def differentiated(self, values: Array) -> Array:
         """The derivative at each place of what is known on the stencils, (n, 9) or (m, 9)."""
         return np.asarray(values @ STENCIL / STEP)

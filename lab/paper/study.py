@@ -35,12 +35,13 @@ from lab.paper.equations import equations
 from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import MEASURES
 from lab.paper.page import Picture, Report
-from lab.paper.prints import compared
+from lab.paper.prints import LETTERS, compared
 from lab.paper.quantities import quantities
-from lab.paper.replay import replay
+from lab.paper.replay import replays
 from lab.paper.results import Beyond
 from lab.paper.statements import STATEMENTS
 
+RANDOM_STARTS = 200
 DPI = 220
 COLORS = 256  # of a PNG file
 Jobs = dict[str, tuple[Any, ...]]  # by what comes out: what computes it, and of what
@@ -49,11 +50,11 @@ Jobs = dict[str, tuple[Any, ...]]  # by what comes out: what computes it, and of
 def report(starts: int) -> Report:
     """Compute everything, with so many random starts."""
     cases, drawn = load_cases(), random_starts(starts)
-    jobs = {**_further_jobs(cases, drawn), **_drawing_jobs(cases), **_table_jobs(cases)}  # the longest first
-    claims, done = [], {}
+    jobs, drawings, claims, done = _jobs(cases, drawn), _drawings(cases), [], {}
     context = multiprocessing.get_context("spawn")
     with context.Pool(os.cpu_count() or 1) as pool, tqdm(total=len(STATEMENTS) + len(jobs), file=sys.stderr) as bar:
         asked = {key: pool.apply_async(function, of) for key, (function, *of) in jobs.items()}
+        pictured = {key: pool.apply_async(_drawn, of) for key, of in drawings.items()}
         for each in STATEMENTS.values():  # here: what one measures the next one remembers
             bar.set_description(f"random starts and sweeps of {each.key}")
             claims.append(each.judge(cases, drawn))
@@ -62,56 +63,33 @@ def report(starts: int) -> Report:
         for key, answer in asked.items():
             done[key] = answer.get()
             bar.update()
-    images = {key: done[key] for key in _drawing_jobs(cases)} | {key: done[key][1] for key in Beyond._fields}
+        found = Beyond(**{key: done.pop(key) for key in Beyond._fields})
+        own = {key: (getattr(beyond_figures, key), numbers) for key, numbers in found._asdict().items()}
+        pictured |= {key: pool.apply_async(_drawn, of) for key, of in own.items() if key not in pictured}
+        images = {key: answer.get() for key, answer in pictured.items()}
     images["sweeps"] = image(beyond_figures.sweeps(_curves(cases, claims)))
-    return Report(
-        starts, claims, [picture(figure, cases, claims) for figure in FIGURES], done["quantities"], done["equations"],
-        Beyond(**{key: done[key][0] for key in Beyond._fields}), done["doubts"], done["replays"], images,
-    )
+    pictures = [picture(figure, cases, claims) for figure in FIGURES]
+    return Report(starts, claims, pictures, found=found, images=images, **done)
 
 
-def _further_jobs(cases: Cases, drawn: list[Start]) -> Jobs:
-    """What the paper lacks, each with its figure."""
-    symmetric = started(cases[2], SYMMETRIC)
+def _jobs(cases: Cases, drawn: list[Start]) -> Jobs:
+    """What the paper lacks, the longest first, and the tables of the page."""
     return {
-        "chaos": (_further, beyond.chaos, beyond_figures.chaos, cases, symmetric),
-        "stiffer": (_further, arms.stiffer, beyond_figures.stiffer, cases, drawn),
-        "damped": (_further, arms.damped, beyond_figures.damped, cases, drawn),
-        "gap": (_further, beyond.gap, beyond_figures.gap, cases),
-        "tail": (_further, beyond.tail, beyond_figures.tail, cases[1]),
-        "stepped": (_stepped, cases),
-        "edge": (_further, knife_edge, beyond_figures.edge, cases),
+        "chaos": (beyond.chaos, cases, started(cases[2], SYMMETRIC)), "stiffer": (arms.stiffer, cases, drawn),
+        "damped": (arms.damped, cases, drawn), "gap": (beyond.gap, cases), "tail": (beyond.tail, cases[1]),
+        "stepped": (arms.stepped, cases), "edge": (knife_edge, cases), "equations": (equations, cases),
+        "quantities": (quantities, cases), "doubts": (doubts, cases), "replays": (replays, cases),
     }
 
 
-def _drawing_jobs(cases: Cases) -> Jobs:
-    return {"sheet": (_sheet, cases), **{f"fig_{each.number:02d}": (_large, each, cases) for each in FIGURES}}
+def _drawings(cases: Cases) -> Jobs:
+    """Figures that simulate what they show."""
+    return {"sheet": (figures.sheet, cases), "stepped": (beyond_figures.stepped, cases),
+            **{f"fig_{each.number:02d}": (figures.large, each, cases) for each in FIGURES}}
 
 
-def _table_jobs(cases: Cases) -> Jobs:
-    return {"equations": (equations, cases), "quantities": (quantities, cases), "doubts": (doubts, cases),
-            "replays": (_replays, cases)}
-
-
-def _further(compute: Callable[..., Any], draw: Callable[[Any], Any], *of: Any) -> tuple[Any, bytes]:
-    found = compute(*of)
-    return found, image(draw(found))
-
-
-def _stepped(cases: Cases) -> tuple[Any, bytes]:
-    return arms.stepped(cases), image(beyond_figures.stepped(cases))
-
-
-def _sheet(cases: Cases) -> bytes:
-    return image(figures.sheet([figures.pictured(figure, cases) for figure in FIGURES]))
-
-
-def _large(figure: Figure, cases: Cases) -> bytes:
-    return image(figures.large(figures.pictured(figure, cases)))
-
-
-def _replays(cases: Cases) -> list[dict[str, Any]]:
-    return [replay(figure, cases[figure.case]) for figure in FIGURES]
+def _drawn(draw: Callable[..., Any], *of: Any) -> bytes:
+    return image(draw(*of))
 
 
 def image(drawing: Any) -> bytes:
@@ -130,8 +108,7 @@ def picture(figure: Figure, cases: Cases, claims: Sequence[Claim]) -> Picture:
     scene = cases[figure.case]
     run = simulate(scene)
     left, right = (len(run.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))
-    values = ", ".join(f"{letter} = {value_of(scene, letter):g}"
-                       for letter in ("m_l", "m_r", "k", "c", "Kp", "Kv", "p", "H", "m_o"))
+    values = ", ".join(f"{letter} = {value_of(scene, letter):g}" for letter in LETTERS)
     x_l, x_r, x_o = start_of(scene)
     both = "" if (run.energy.V_c == run.energy.V).all() else " and V, where they differ"
     caption = (

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from grasp_ros.scene import Scene
 from lab.paper.cases import NUMBERS, PRINTED, READ_P, SEED, STANDARD, Cases, Start, read_starts, started, with_values
-from lab.paper.claims import Check, Kind, Part, almost_all
+from lab.paper.claims import ALMOST_ALL, Check, Kind, Part
 
 FEW = 20  # random starts of each case
 FEWER = 10  # of each value of a sweep
@@ -149,7 +149,7 @@ class Share(NamedTuple):
             f"{100.0 * share:.3g} % of {len(drawn)}; {values[len(values) // 2]:.3g}{self.test.unit} in the middle, "
             f"from {values[0]:.3g} to {values[-1]:.3g}"
         )
-        return Check(kind, text, value, share, almost_all(share), len(drawn))
+        return Check(kind, text, value, share, share >= ALMOST_ALL, len(drawn))
 
 
 def _named(numbers: Sequence[int]) -> str:

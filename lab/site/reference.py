@@ -101,7 +101,6 @@ def _subparsers(parser: argparse.ArgumentParser) -> Iterator[tuple[str, argparse
 
 
 def _command(program: str, name: str, parser: argparse.ArgumentParser) -> str:
-    """Usage and arguments of one command."""
     formatter = argparse.HelpFormatter(parser.prog, width=100)
     formatter.add_usage(parser.usage, parser._actions, parser._mutually_exclusive_groups, "")
     rows = [(_spelling(action), _cell(formatter._expand_help(action) if action.help else ""))
@@ -113,7 +112,6 @@ def _command(program: str, name: str, parser: argparse.ArgumentParser) -> str:
 
 
 def _spelling(action: argparse.Action) -> str:
-    """How an argument is written."""
     choices = "{" + ",".join(map(str, action.choices)) + "}" if action.choices else None
     value = action.metavar or choices or (action.dest.upper() if action.option_strings else action.dest)
     if not action.option_strings:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -34,11 +35,7 @@ def default_scenes() -> list[Scene]:
     """Cases 1 to 4 of the paper, and case 1 with a contact that is stiffer by 1e4."""
     name, hertzian = STIFF
     stiff = scenes.load(name, [f"{side}_contact.hertz_N_per_m1_5={hertzian}" for side in ("left", "right")])
-    renamed = scenes.compose(
-        f"{name}_H{hertzian:.0e}".replace("+0", ""), stiff.values, title=stiff.title, readings=stiff.readings,
-        watch=stiff.watch,
-    )
-    return [*map(scenes.load, STANDARD), renamed]
+    return [*map(scenes.load, STANDARD), replace(stiff, name=f"{name}_H{hertzian:.0e}".replace("+0", ""))]
 
 
 def run(subjects: Sequence[Scene], directory: Path, effort: Effort, contenders: Sequence[Contender]) -> list[Record]:

@@ -34,13 +34,13 @@ QUICK_S = 5.0
 QUICK_DRIFT = {EXACT: 1e-16, "paper": 1e-3, "discrete_gradient": 1e-3}
 
 
-def write(docs: Path, directory: Path, quick: bool) -> Path:
-    """Run all studies, as far as the journal does not have them; returns the page.
+def run(docs: Path | None, directory: Path, quick: bool) -> None:
+    """Run all studies, as far as the journal does not have them, and write the page.
 
     Parameters
     ----------
-    docs : Path
-        Directory of the page; figures and records go to `accuracy` in it.
+    docs : Path, optional
+        Directory of the page, default that of the journal; figures and records go to `accuracy` in it.
     directory : Path
         The journal.
     quick : bool
@@ -51,6 +51,7 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
     Refused
         If a directory cannot be written.
     """
+    docs = docs or directory
     place = docs / "accuracy"
     with writing(place):
         place.mkdir(parents=True, exist_ok=True)
@@ -62,7 +63,8 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
         contender for contender in all_contenders(case) if contender.family == OURS or not quick])
     drifts = drift.run(directory, *((QUICK_S, QUICK_DRIFT) if quick else (drift.SECONDS, None)))
     predictions = predictability.run(subjects, QUICK_S if quick else predictability.SECONDS)
-    limits = stability.limits(grasp_of(case).left)
+    arm = grasp_of(case).left
+    limits = stability.limits(arm)
     points = loop.run(case, directory, () if quick else loop.GRAPH_PERIODS_MS)
 
     write_csv(records, place / "records.csv")
@@ -71,27 +73,27 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
     figures.energy_drift(drifts, place / "energy_drift.png")
     figures.prediction(predictions, place / "prediction.png")
     figures.control_period(points, case.name, place / "control_period.png")
-    figures.stability(*stability.curves(grasp_of(case).left, limits), place / "stability.png")
-    return pages.write(
+    figures.stability(arm, limits, place / "stability.png")
+    pages.write(
         docs, "accuracy", metric=accuracy.METRIC, points=simulation.GRID_POINTS, **accuracy_rows.by_error(records),
         drift=accuracy_rows.drift(drifts), prediction=accuracy_rows.prediction(predictions),
         topics=accuracy_rows.topics(case.title, points, limits),
-        profiles=accuracy_rows.profiles(_profiles(subjects, records)),
+        profiles=_profiles(subjects, records),
         last=None if quick else accuracy_rows.last_state(_final_states(subjects, directory)),
     )
 
 
-def _profiles(subjects: Sequence[Scene], records: Sequence[Record]) -> list[profile.Profile]:
+def _profiles(subjects: Sequence[Scene], records: Sequence[Record]) -> list[list[str]]:
     """Where the time of `exact` goes, at its fastest setting for the error; its finest where that is not reached."""
     found = []
     for scene in subjects:
         own = [record for record in records if (record.scene, record.method) == (scene.name, EXACT)]
         first = fastest(own, accuracy_rows.ERROR)
-        found.append(profile.profile(scene, METHODS[EXACT].default if first is None else first.setting))
+        found.append(profile.row(scene, METHODS[EXACT].default if first is None else first.setting))
     return found
 
 
-def _final_states(subjects: Sequence[Scene], directory: Path) -> dict[str, list[speed.Timing]]:
+def _final_states(subjects: Sequence[Scene], directory: Path) -> dict[str, list[speed.Timing | None]]:
     journal = Journal(directory)
     return {scene.name: speed.final_state(scene, measure.truth(scene, journal), accuracy_rows.ERROR)
             for scene in subjects}

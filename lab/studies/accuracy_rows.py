@@ -14,7 +14,6 @@ from grasp_ros.methods.registry import EXACT, METHODS
 from lab.studies import accuracy, predictability
 from lab.studies.drift import Drift
 from lab.studies.loop import Point
-from lab.studies.profile import Profile
 from lab.studies.records import by_scene, milliseconds
 from lab.studies.speed import Timing
 from lab.studies.stability import Limit
@@ -41,7 +40,6 @@ def by_error(records: Sequence[Record]) -> dict[str, Any]:
 
 
 def _choice(scenes: dict[str, list[Record]]) -> dict[str, Any]:
-    """Which method for which error."""
     rows, ahead, ratios, finest = [], 0, [], []
     for name, here in scenes.items():
         mine = [record for record in here if record.method == EXACT]
@@ -58,7 +56,6 @@ def _choice(scenes: dict[str, list[Record]]) -> dict[str, Any]:
 
 
 def _paper(name: str, here: Sequence[Record]) -> list[str]:
-    """What the paper's method costs on a scene."""
     runs = [record for record in here if record.method == "paper"]
     found, own = fastest(runs, LOOSE), _fastest(here, [EXACT], LOOSE)
     best = min((record for record in runs if record.good), key=lambda record: record.error or 0.0, default=None)
@@ -70,7 +67,6 @@ def _paper(name: str, here: Sequence[Record]) -> list[str]:
 
 
 def _tolerance(records: Sequence[Record], names: list[str]) -> dict[str, Any]:
-    """The errors at one tolerance."""
     chosen = [r for r in records if r.knob == TOLERANCE and abs(r.setting / SAME_TOLERANCE - 1.0) < 1e-6]
     factors = [record.error / SAME_TOLERANCE for record in chosen if record.error is not None]
     rows = []
@@ -82,7 +78,6 @@ def _tolerance(records: Sequence[Record], names: list[str]) -> dict[str, Any]:
 
 
 def _missed(records: Sequence[Record]) -> dict[str, Any]:
-    """Contacts missed, and runs that failed."""
     wrong = [record for record in records if record.missed]
     failed = [[r.scene, r.method, f"{r.knob} {r.setting:.0e}", r.status] for r in records if not r.good]
     return {"wrong": len(wrong), "runs": len(records), "silent": sum(record.status == "done" for record in wrong),
@@ -134,23 +129,11 @@ def topics(title: str, points: Sequence[Point], limits: Sequence[Limit]) -> dict
     return {"scene": title, "rows": rows, "order": order, "limits": edges}
 
 
-def profiles(found: Sequence[Profile]) -> list[list[str]]:
-    """Where the time of `exact` goes."""
-    rows = []
-    for p in found:
-        shares = [p.call - p.outputs, p.outputs - p.end, p.expansions, p.end - p.expansions]
-        rows.append([p.scene, f"{p.accuracy:.0e}", f"{1e3 * p.call:.3g} ms", *(f"{s / p.call:.0%}" for s in shares),
-                     f"{p.contact_steps}, with one side of order {p.order}, {1e9 * p.expansion:.0f} ns each"])
-    return rows
-
-
-def last_state(timings: dict[str, list[Timing]]) -> dict[str, Any]:
+def last_state(timings: dict[str, list[Timing | None]]) -> dict[str, Any]:
     """The last state alone, where a rival has less to do."""
     rows, ratios = [], []
-    for name, row in timings.items():
-        times = {timing.record.method == EXACT: timing for timing in row}
-        own, other = times.get(True), times.get(False)
-        ratio = other.median / own.median if own is not None and other is not None else None
+    for name, (own, other) in timings.items():
+        ratio = other.median / own.median if own and other else None
         ratios += [] if ratio is None else [ratio]
         cells = [f"{1e3 * t.median:.3g} ms, error {t.record.error:.0e}" if t else "not reached" for t in (own, other)]
         rows.append([name, *cells, "-" if ratio is None else f"{ratio:.2f}"])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import sys
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +16,6 @@ from grasp_ros.physics.model import Arm, Array, Contact
 from grasp_ros.physics.system import NAMES, System
 from grasp_ros.simulation import simulate
 from lab.reference.grasp import Grasp, system_of
-from lab.studies import pages
 from lab.studies.stability import first_limit
 
 SCENES = ("v_jump_symmetric", "v_jump_one_sided", "v_jump_smallest_p")
@@ -147,19 +145,10 @@ def search(family: Family, draws: int, steps: int, seed: int) -> Found:
     return best
 
 
-def run(docs: Path | None) -> None:
-    """Print jumps and limits; with a directory of pages, write the page there.
-
-    Raises
-    ------
-    Refused
-        If the page cannot be written.
-    """
-    found = {"jumps": jump_rows(), "limits": limit_rows(), "smallest": smallest_rows(DRAWS, STEPS)}
-    for rows in found.values():
-        print("\n".join(" ".join(row) for row in rows), end="\n\n")
-    if docs is not None:
-        pages.write(docs, "jumps", amplitude=AMPLITUDE, horizon=HORIZON, draws=DRAWS, steps=STEPS, seed=SEED, **found)
+def numbers() -> dict[str, object]:
+    """What docs/jumps.md needs: jumps, the smallest p that have one, and limits of the control period."""
+    return {"jumps": jump_rows(), "limits": limit_rows(), "smallest": smallest_rows(DRAWS, STEPS),
+            "amplitude": AMPLITUDE, "horizon": HORIZON, "draws": DRAWS, "steps": STEPS, "seed": SEED}
 
 
 def limit_rows() -> list[list[str]]:

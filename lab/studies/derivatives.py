@@ -38,19 +38,8 @@ class Known(NamedTuple):
     state: list[list[float]]  # derivatives of the states at PARTS of the horizon
 
 
-class Row(NamedTuple):
-    """One scene, one number, one time."""
-
-    scene: str
-    key: str
-    t: float  # s
-    size: float  # largest of the six derivatives
-    error: float  # the largest, by that size
-    spread: float  # how much one rounding of the initial places changes them, likewise
-
-
-def run(directory: Path) -> list[Row]:
-    """Compare all subjects; differences of the reference are kept in a journal."""
+def reference(directory: Path) -> str:
+    """All subjects beside differences of the reference, which a journal keeps: a table of Markdown."""
     journal, rows = Journal(directory), []
     for name, key in SUBJECTS:
         scene = scenes.load(name)
@@ -59,20 +48,22 @@ def run(directory: Path) -> list[Row]:
         entry = f"derivative {scene_key(scene)} {key} {times!r}"
         known = journal.kept(entry, Known, partial(_known, scene, key, times))
         rows += _rows(scene, key, np.array(times), np.array(known.state))
-    return rows
+    heads = ("scene", "number", "t, s", "largest derivative", "relative error", "one rounding changes it by")
+    return pages.table(heads, rows)
 
 
 def _known(scene: Scene, key: str, times: list[float]) -> Known:
     return Known(difference(scene, key, times).state.tolist())
 
 
-def _rows(scene: Scene, key: str, times: Array, expected: Array) -> list[Row]:
+def _rows(scene: Scene, key: str, times: Array, expected: Array) -> list[list[str]]:
+    """One scene and one number at some times: sizes are the largest of six derivatives, errors relative to them."""
     found, size = _derivative(scene, key, times), np.abs(expected).max(axis=1)
     signs = np.random.default_rng(1990).choice([-1.0, 1.0], size=(ROUNDINGS, 3))
     spread = np.max([np.abs(_derivative(_off(scene, row), key, times) - found).max(axis=1) for row in signs], axis=0)
     error = np.abs(found - expected).max(axis=1)
-    return [Row(scene.name, key, *(float(value) for value in row))
-            for row in zip(times, size, error / size, spread / size, strict=True)]
+    return [[scene.name, f"`{key}`", f"{t:g}", f"{largest:.3g}", f"{off:.1e}", f"{moved:.1e}"]
+            for t, largest, off, moved in zip(times, size, error / size, spread / size, strict=True)]
 
 
 def _derivative(scene: Scene, key: str, times: Array) -> Array:
@@ -85,14 +76,6 @@ def _off(scene: Scene, signs: Array) -> Scene:
     off = signs * np.spacing(np.abs(scene.initial_state).max())
     places = zip(("left_arm", "object", "right_arm"), off.tolist(), strict=True)
     return scene.changed({f"{body}.position_m": scene.values[body]["position_m"] + way for body, way in places})
-
-
-def report(rows: list[Row]) -> str:
-    """The rows as a table of Markdown."""
-    heads = ("scene", "number", "t, s", "largest derivative", "relative error", "one rounding changes it by")
-    return pages.table(heads, (
-        (row.scene, f"`{row.key}`", f"{row.t:g}", f"{row.size:.3g}", f"{row.error:.1e}", f"{row.spread:.1e}")
-        for row in rows))
 
 
 def random_scenes(draws: int) -> str:
@@ -109,7 +92,7 @@ def random_scenes(draws: int) -> str:
 def tables(names: list[str], directory: Path, draws: int) -> dict[str, str]:
     """The named tables of the page, measured now."""
     measures = {
-        REFERENCE: lambda: report(run(directory)), RANDOM: lambda: random_scenes(draws),
+        REFERENCE: lambda: reference(directory), RANDOM: lambda: random_scenes(draws),
         PEERS: lambda: peer_derivatives.report(peer_derivatives.run()), COST: derivative_cost.run,
     }
     return {name: measures[name]() for name in names}

@@ -41,13 +41,6 @@ RECORDED_S = 1.0
 LESSER = ("hammer", "no_contact")  # scenes that name less than the paper's grasp
 
 
-class Counts(NamedTuple):
-    """How many flights and Taylor steps a motion has: under continuous feedback, and with held commands."""
-
-    continuous: tuple[int, int] | None  # None: the scene is sampled
-    sampled: tuple[int, int]
-
-
 class Cost(NamedTuple):
     """What they take, s."""
 
@@ -59,7 +52,7 @@ class Cost(NamedTuple):
 
 
 def run(docs: Path | None) -> None:
-    """Print the costs; with a directory of pages, write the page with its figure there.
+    """Print the page on costs, or write it with its figure into a directory of pages.
 
     Raises
     ------
@@ -71,11 +64,10 @@ def run(docs: Path | None) -> None:
     costs = measure(found)
     keys = {name: added(scene, one) if name in BY_SECTION else [] for name, one in found.items()}
     rows = [row(name, keys[name], counts(one), costs[name]) for name, one in found.items()]
-    print("\n".join("  ".join(cells) for cells in rows))
     if docs is not None:
         shown = [(name, cost.tick * 1e6, cost.bag / 1e3) for name, cost in costs.items()]
         page_figures.effect_costs(shown, docs / f"{PAGE}.png")
-        pages.write(docs, PAGE, scene=scene, rows=rows)
+    pages.write(docs, PAGE, scene=scene, rows=rows)
 
 
 def variants(scene: Scene) -> dict[str, Scene]:
@@ -106,26 +98,20 @@ def added(scene: Scene, variant: Scene) -> list[str]:
     return keys
 
 
-def counts(scene: Scene) -> Counts:
-    """Count the work of a scene."""
-    sampled = simulate(scene, sampled=True).work
-    continuous = None if scene.sampled else simulate(scene, grid=np.array([scene.duration])).work
-    return Counts(None if continuous is None else _pair(continuous), _pair(sampled))
+def counts(scene: Scene) -> list[str]:
+    """Flights and Taylor steps under continuous feedback, "-" for a scene that is sampled, and with held commands."""
+    free = None if scene.sampled else simulate(scene, grid=np.array([scene.duration]))
+    return ["-" if run is None else str(run.work[entry]) for run in (free, simulate(scene, sampled=True))
+            for entry in (Work.FLIGHTS, Work.CONTACT_STEPS)]
 
 
-def _pair(work: np.ndarray) -> tuple[int, int]:
-    return int(work[Work.FLIGHTS]), int(work[Work.CONTACT_STEPS])
-
-
-def row(name: str, keys: Sequence[str], counted: Counts, cost: Cost) -> list[str]:
+def row(name: str, keys: Sequence[str], counted: Sequence[str], cost: Cost) -> list[str]:
     """The cells of a variant: its keys, work and times of continuous feedback and with held commands, and the bag."""
-    flights, steps = counted.continuous or ("-", "-")
+    flights, steps, *held = counted
     times = [f"{number:.0f}" if math.isfinite(number) else "-" for number in (1e9 * cost.flight, 1e9 * cost.step)]
     words = ", ".join(f"`{key.removeprefix(f'{name}.')}`" for key in keys)
-    return [
-        name, words, str(flights), times[0], str(steps), times[1], *map(str, counted.sampled),
-        f"{1e6 * cost.tick:.2f}", f"{1e6 * cost.physics:.2f}", f"{1e-3 * cost.bag:.0f}",
-    ]
+    return [name, words, flights, times[0], steps, times[1], *held, f"{1e6 * cost.tick:.2f}",
+            f"{1e6 * cost.physics:.2f}", f"{1e-3 * cost.bag:.0f}"]
 
 
 def measure(found: Mapping[str, Scene]) -> dict[str, Cost]:
@@ -175,7 +161,6 @@ def physics_of(scene: Scene) -> Callable[[], Array]:
 
 
 def _bag_size(scene: Scene) -> float:
-    """Bytes that a simulated second takes in a bag."""
     short = scene.changed({"time.duration_s": RECORDED_S})
     with tempfile.TemporaryDirectory() as directory:
         bag = Path(directory) / "bag"

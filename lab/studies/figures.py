@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import cycle
 from pathlib import Path
@@ -14,6 +15,8 @@ from matplotlib.lines import Line2D
 from grasp_ros.accuracy.compare import by_method
 from grasp_ros.accuracy.measure import Record
 from grasp_ros.methods.contract import STEP
+from grasp_ros.physics.model import Arm
+from grasp_ros.physics.sampled import spectral_radius
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.plots import save
 from lab.studies.accuracy import frontier
@@ -21,19 +24,16 @@ from lab.studies.drift import Drift
 from lab.studies.loop import Point
 from lab.studies.predictability import LEVELS, Prediction
 from lab.studies.records import by_scene
+from lab.studies.stability import FIRST_S, Limit, simulated_growth
 
 COLORS = {  # by the beginning of a method's name; distinguishable for colour-blind readers
     "exact": "#000000", "paper": "#d55e00", "rk45": "#56b4e9", "rk4": "#e69f00", "discrete": "#8c6d1f",
     "dop853": "#0072b2", "radau": "#cc79a7", "lsoda": "#7a5195", "odeint": "#7a5195", "cvode": "#999999",
     "heyoka": "#009e73",
 }
+GRID = {"axes.grid": True, "grid.alpha": 0.25}
 HEIGHT, WIDTH = 3.1, 4.3  # inches, of a panel
 DPI = 130
-
-
-def color(method: str) -> str:
-    """One colour per family of methods."""
-    return next(value for name, value in COLORS.items() if method.startswith(name))
 
 
 def style(method: str) -> dict[str, Any]:
@@ -42,13 +42,14 @@ def style(method: str) -> dict[str, Any]:
     located = bold or method.endswith("_events") or method.startswith(("heyoka", "discrete"))
     mark = {"o": method.endswith("_events") or bold, "s": method == "odeint" or method.startswith("heyoka_")}
     return {
-        "color": color(method), "linestyle": "-" if located else (0, (4, 2)), "linewidth": 2.2 if bold else 0.9,
+        "color": next(value for name, value in COLORS.items() if method.startswith(name)),
+        "linestyle": "-" if located else (0, (4, 2)), "linewidth": 2.2 if bold else 0.9,
         "marker": next((m for m, is_so in mark.items() if is_so), "^"), "markersize": 3.5 if bold else 2.5,
         "zorder": 4 if bold else 2,
     }
 
 
-@canvas.style()
+@canvas.style(GRID)
 def work_precision(records: Sequence[Record], metric: str, path: Path) -> None:
     """Error against time, one panel a scene, with the frontier that no method passes."""
     scenes = by_scene(records)
@@ -73,7 +74,6 @@ def work_precision(records: Sequence[Record], metric: str, path: Path) -> None:
                 va="top", fontsize=6, color="#cc0000",
             )
         axes.set(xscale="log", yscale="log", ylim=(1e-14, 1e2), xlabel="fastest warm run, s")
-        axes.grid(alpha=0.25, which="major")
     for axes in grid.flat[len(scenes) :]:
         axes.axis("off")
     _method_legend(grid.flat[len(scenes)], list(by_method(records)))
@@ -95,7 +95,7 @@ def _method_legend(axes: Axes, methods: list[str]) -> None:
     axes.legend(handles=handles, loc="center", ncols=2, fontsize=7, frameon=False, handlelength=3.0)
 
 
-@canvas.style()
+@canvas.style(GRID)
 def contacts_missed(records: Sequence[Record], path: Path) -> None:
     """By how much the count of touches is wrong, against tolerance (above) and step (below)."""
     scenes = by_scene(records)
@@ -115,7 +115,6 @@ def contacts_missed(records: Sequence[Record], path: Path) -> None:
             axes.set_yscale("symlog", linthresh=1.0)
             axes.set_ylim(-0.3, 200)
             axes.set_yticks([0, 1, 10, 100], ["0", "1", "10", "100"])
-            axes.grid(alpha=0.25)
         if not grid[row, 0].xaxis_inverted():
             grid[row, 0].invert_xaxis()
         grid[row, 0].set_ylabel("touches missed\nor invented")
@@ -127,7 +126,7 @@ def contacts_missed(records: Sequence[Record], path: Path) -> None:
     save(figure, path, DPI)
 
 
-@canvas.style()
+@canvas.style(GRID)
 def energy_drift(drifts: Sequence[Drift], path: Path) -> None:
     """Relative energy drift against time."""
     figure, axes = canvas.subplots(figsize=(8.5, 4.8))
@@ -146,11 +145,10 @@ def energy_drift(drifts: Sequence[Drift], path: Path) -> None:
     )
     axes.legend(fontsize=7, title="method, setting: worst drift, wall time", title_fontsize=7, loc="center left",
                 bbox_to_anchor=(1.0, 0.5))
-    axes.grid(alpha=0.25)
     save(figure, path, DPI)
 
 
-@canvas.style()
+@canvas.style(GRID)
 def control_period(points: Sequence[Point], name: str, path: Path) -> None:
     """Deviation and price of the sampled loop against the control period."""
     figure, (left, right) = canvas.subplots(1, 2, figsize=(9.5, 4.0))
@@ -177,11 +175,10 @@ def control_period(points: Sequence[Point], name: str, path: Path) -> None:
         axes.invert_xaxis()
         axes.set_xticks([20, 10, 5, 2, 1, 0.5, 0.2, 0.1], ["20", "10", "5", "2", "1", "0.5", "0.2", "0.1"])
         axes.minorticks_off()
-        axes.grid(alpha=0.25)
     save(figure, path, DPI)
 
 
-@canvas.style()
+@canvas.style(GRID)
 def prediction(predictions: Sequence[Prediction], path: Path) -> None:
     """How two roundings grow."""
     figure, axes = canvas.subplots(figsize=(8.0, 4.4))
@@ -198,33 +195,27 @@ def prediction(predictions: Sequence[Prediction], path: Path) -> None:
         title="how far ahead double precision can see: an error is for sale until its line is crossed",
     )
     axes.legend(fontsize=8, loc="lower right")
-    axes.grid(alpha=0.25)
     save(figure, path, DPI)
 
 
-@canvas.style()
-def stability(curves: dict[str, tuple[Any, Any]], points: Any, limits: dict[str, float], path: Path) -> None:
-    """Spectral radius of the sampled loop against the period, and growth in the simulation.
-
-    Parameters
-    ----------
-    curves : dict
-        By label: periods in s and spectral radii.
-    points : sequence of (period in s, simulated growth per period)
-    limits : dict
-        By label: the first period at which the radius is 1, s.
-    """
+@canvas.style(GRID)
+def stability(arm: Arm, limits: Sequence[Limit], path: Path) -> None:
+    """Spectral radius of the sampled loop of an arm against the period, by delay, and growth in the simulation."""
     figure, axes = canvas.subplots(figsize=(7.5, 4.0))
-    for (label, (period, radius)), shade in zip(curves.items(), ("#0072b2", "#d55e00"), strict=False):
-        text = f"{label}: stable to {1e3 * limits[label]:.4g} ms"
-        axes.plot(1e3 * np.asarray(period), radius, color=shade, label=text)
-        axes.plot([1e3 * limits[label]], [1.0], "o", color=shade)
-    axes.plot([1e3 * h for h, _ in points], [growth for _, growth in points], "x", color="black", label="simulated")
+    finite = [limit for limit in limits if math.isfinite(limit.period)]
+    last = 1.3 * max((limit.period for limit in finite), default=FIRST_S)
+    periods, simulated = np.linspace(last / 300.0, last, 300), []
+    for limit, shade in zip(finite, ("#0072b2", "#d55e00"), strict=False):
+        text = f"delay of {limit.delay} periods: stable to {1e3 * limit.period:.4g} ms"
+        axes.plot(1e3 * periods, spectral_radius(arm, periods, limit.delay), color=shade, label=text)
+        axes.plot([1e3 * limit.period], [1.0], "o", color=shade)
+        simulated += [*limit.checks, *((h, simulated_growth(arm, h, limit.delay, 800)) for h in periods[30::45])]
+    axes.plot([1e3 * h for h, _ in simulated], [growth for _, growth in simulated], "x", color="black",
+              label="simulated")
     axes.axhline(1.0, color="black", linewidth=0.8)
     axes.set(
         xlabel="control period, ms", ylabel="growth per period: spectral radius",
         title="the sampled loop of a free arm: below 1 it is stable",
     )
     axes.legend(fontsize=8)
-    axes.grid(alpha=0.25)
     save(figure, path, DPI)

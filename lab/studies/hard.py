@@ -55,7 +55,7 @@ class Other:
         return simulate(scene, method=self.name, setting=min(self.setting, scene.duration)).events
 
 
-def run(docs: Path | None, *, alone: bool) -> int:
+def run(docs: Path | None, alone: bool) -> int:
     """Print a row for each case; with a directory of pages, write the page there. Returns 1 if a case is wrong.
 
     Raises

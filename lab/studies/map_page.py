@@ -19,14 +19,15 @@ OUTCOMES = ("touches_left", "touches_right", "peak_input_left", "peak_input_righ
             "peak_impact_right")
 
 
-def write(docs: Path, directory: Path, quick: bool) -> Path:
-    """Compute what is not there yet, and write the page with its pictures; returns it.
+def run(docs: Path | None, directory: Path, quick: bool) -> None:
+    """Compute what is not there yet, and write the page with its pictures.
 
     Raises
     ------
     Refused
         If a directory cannot be written.
     """
+    docs = docs or directory
     place = docs / "maps"
     with writing(place):
         place.mkdir(parents=True, exist_ok=True)
@@ -37,33 +38,24 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
     map_figures.settling(settled, place / "settling.png")
     map_figures.limits(limits, place / "limits.png")
     figures.draw(data, plan, "settling_time", place / "robustness.png")
-    return pages.write(docs, "maps", map=_map(settled), loops=_loops(limits), sample=_sample(plan, data, seconds))
+    pages.write(docs, "maps", maps=maps, found=settled, map=_map(settled), loops=limits.loops, plan=plan,
+                sample=_sample(plan, data), seconds=seconds)
 
 
 def _map(found: maps.Settling) -> dict[str, Any]:
-    """How much of the map settles by when, and how much its pixels differ from their neighbours."""
-    times, (loss, gain) = found.data["settling_time"].values, found.zoom.axes
+    """How much of the map settles by when."""
+    times = found.data["settling_time"].values
     quarter = len(times) // 4
+    gain, finer = (plan.axes[1].values for plan in (found.plan, found.zoom))
     return {
-        "pixels": times.size, "settled": np.isfinite(times).mean(), "within": found.within, "bound": maps.SETTLED,
-        "shares": [((times <= limit).mean(), limit) for limit in SHARES_S], "jump": maps.JUMP,
+        "pixels": times.size, "settled": np.isfinite(times).mean(),
+        "shares": [((times <= limit).mean(), limit) for limit in SHARES_S],
         "least": np.isfinite(times[:quarter]).mean(), "most": np.isfinite(times[-quarter:]).mean(),
-        "jumps": found.jumps, "gain": gain, "loss": loss, "finest": found.plan.setup.accuracy, "rougher": maps.ROUGHER,
-        "changed": found.changed,
-        "finer": np.diff(found.plan.axes[1].values[:2])[0] / np.diff(gain.values[:2])[0], "seconds": found.seconds,
+        "finer": np.diff(gain[:2])[0] / np.diff(finer[:2])[0],
     }
 
 
-def _loops(found: maps.Limits) -> dict[str, Any]:
-    """Which part of the runs is unstable, and from which period on."""
-    return {
-        "ticks": maps.TICKS, "grown": maps.GROWN, "noise": list(maps.NOISE.values()),
-        "safe": all(loop.shift > 1.0 for loop in found.loops[:2]),
-        "rows": [(loop.name, f"{loop.unstable.mean():.1%}", f"{loop.shift:.3f}") for loop in found.loops],
-    }
-
-
-def _sample(plan: Plan, data: Any, seconds: float) -> dict[str, Any]:
+def _sample(plan: Plan, data: Any) -> dict[str, Any]:
     """How many grasps settle, when, and by which numbers."""
     values = data["settling_time"].values
     settling, rows = values[np.isfinite(values)], []
@@ -72,8 +64,7 @@ def _sample(plan: Plan, data: Any, seconds: float) -> dict[str, Any]:
         found = np.quantile(column.values[np.isfinite(column.values)], (0.0, 0.05, 0.5, 0.95, 1.0))
         rows.append((canvas.label(name, column.attrs["units"]), *(f"{number:.4g}" for number in found)))
     return {
-        "runs": len(values), "axes": len(plan.axes), "off": maps.OFF, "done": int((data["status"].values == 0).sum()),
-        "settled": len(settling) / len(values), "within": plan.setup.horizons * plan.scene.duration,
-        "bound": plan.setup.settled, "times": np.quantile(settling, (0.05, 0.5, 0.95, 1.0)),
-        "strong": figures.correlations(data, plan, values)[:STRONGEST], "seconds": seconds, "rows": rows,
+        "done": int((data["status"].values == 0).sum()), "settled": len(settling) / len(values),
+        "times": np.quantile(settling, (0.05, 0.5, 0.95, 1.0)),
+        "strong": figures.correlations(data, plan, values)[:STRONGEST], "rows": rows,
     }

@@ -17,21 +17,23 @@ TEMPLATES = Path(__file__).with_name("templates")
 PRODUCT = "grasp_ros", "config"  # what is measured
 
 
-def write(docs: Path, name: str, **numbers: object) -> Path:
-    """Write docs/NAME.md from its template with these numbers and a stamp; returns it.
+def write(docs: Path | None, name: str, **numbers: object) -> None:
+    """Write docs/NAME.md from its template with these numbers and a stamp; without a directory print it.
 
     Raises
     ------
     Refused
         If it cannot be written.
     """
-    page = docs / f"{name}.md"
-    put(page, render(name, stamp=stamp(), **numbers))
-    return page
+    text = render(name, stamp=stamp(), **numbers)
+    if docs is None:
+        print(text, end="")
+    else:
+        put(docs / f"{name}.md", text)
 
 
 def put(path: Path, text: str) -> None:
-    """Write a text into a file, and make the directory that it needs.
+    """Write a text into a file, and make the directory that it needs; say so.
 
     Raises
     ------
@@ -41,6 +43,7 @@ def put(path: Path, text: str) -> None:
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
+    print(f"written to {path}")
 
 
 def render(name: str, **numbers: object) -> str:
@@ -77,7 +80,7 @@ def claim(path: Path) -> None:
 
 def stamp() -> str:
     """The sentence that every measured page carries: date, commit and machine."""
-    machine = {name: text for name, text in describe_machine().items() if text != "not installed"}
+    machine = describe_machine()
     system, cpu = machine.pop("system"), machine.pop("cpu")
     versions = ", ".join(f"{name} {version}" for name, version in machine.items())
     return f"Measured on {time.strftime('%Y-%m-%d')} from commit {_commit()}: {system}, {cpu}, {versions}."

@@ -10,18 +10,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from functools import partial
-from importlib.util import find_spec
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import mpmath
 import numpy as np
 
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import need
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import compose
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.differentiate import differentiate
+from lab.oracles.closed_forms import impact
 from lab.studies import pages
 
 PACKAGES = "diffrax", "jax", "mujoco", "optimistix", "torch", "torchdiffeq"  # the extra `peers`
@@ -46,14 +46,12 @@ class Row(NamedTuple):
     seconds: float
 
 
+@cache
 def exact() -> tuple[float, Array]:
     """Exit speed, and its derivatives by p, v, H."""
-    with mpmath.workdps(30):
-        p, v = mpmath.mpf(LOSS), mpmath.mpf(SPEED)
-        z = p * v
-        w = 1 + mpmath.lambertw(-(1 + z) * mpmath.exp(-(1 + z))).real
-        slope = z * (1 - w) / (w * (1 + z))
-        return float(w / p), np.array([float((slope * v - w / p) / p), float(slope), 0.0])
+    p, v, e = mpmath.mpf(LOSS), mpmath.mpf(SPEED), impact(REDUCED, HERTZ, LOSS, SPEED).restitution
+    slope = (1 - p * v * e) / (e * (1 + p * v))
+    return float(e * v), np.array([float((slope - e) * v / p), float(slope), 0.0])
 
 
 def run() -> list[Row]:
@@ -64,8 +62,7 @@ def run() -> list[Row]:
     Refused
         If a peer is not installed.
     """
-    if missing := [name for name in PACKAGES if find_spec(name) is None]:
-        raise Refused(f"this needs {', '.join(missing)}; pip install '.[lab,peers]'")
+    need("this", *PACKAGES)
     peers: tuple[Callable[[], Iterator[Row]], ...] = (_ours, *_DIFFRAX, _torchdiffeq, _mjx)
     return [min(peer(), key=lambda row: max(row.by)) for peer in peers]
 

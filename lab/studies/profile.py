@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -22,26 +22,8 @@ RUNS = 100
 EXPANSIONS = 1000
 
 
-class Profile(NamedTuple):
-    """Medians of one scene at one accuracy; all times in s."""
-
-    scene: str
-    accuracy: float
-    order: int  # of the series with one side in contact
-    contact_steps: int
-    call: float  # `simulation.simulate` with all outputs
-    outputs: float  # the integrator alone, with all outputs
-    end: float  # the integrator alone, last state only
-    expansion: float  # of one Taylor step with one side in contact
-
-    @property
-    def expansions(self) -> float:
-        """Time of all expansions in s."""
-        return self.contact_steps * self.expansion
-
-
-def profile(scene: Scene, accuracy: float) -> Profile:
-    """Time the parts of a run in turn, warm."""
+def row(scene: Scene, accuracy: float) -> list[str]:
+    """The cells of one scene at one accuracy: medians of the parts of a run, warm and in turn, and their shares."""
     grid = np.linspace(0.0, scene.duration, simulation.GRID_POINTS)
     order = series_order(accuracy)
     tables, system = new_workspace(order).tables, scene.system
@@ -59,9 +41,10 @@ def profile(scene: Scene, accuracy: float) -> Profile:
         lambda: expand_often(tables.c, tables.f, bodies, system.pairs, order, EXPANSIONS),
     ]
     call, outputs, end, expansions = map(statistics.median, in_turn(parts, RUNS))
-    work = integrate(grid[-1:]).work
-    steps = int(work[Work.CONTACT_STEPS])
-    return Profile(scene.name, accuracy, order, steps, call, outputs, end, expansions / EXPANSIONS)
+    steps, expansion = int(integrate(grid[-1:]).work[Work.CONTACT_STEPS]), expansions / EXPANSIONS
+    shares = [call - outputs, outputs - end, steps * expansion, end - steps * expansion]
+    return [scene.name, f"{accuracy:.0e}", f"{1e3 * call:.3g} ms", *(f"{share / call:.0%}" for share in shares),
+            f"{steps}, with one side of order {order}, {1e9 * expansion:.0f} ns each"]
 
 
 @kernel

@@ -29,12 +29,12 @@ ADAPTED = {"SUNDIALS": "scikit-sundae"}  # family of a contender: the package, w
 
 
 def describe_machine() -> dict[str, str]:
-    """Platform, processor and versions."""
+    """Platform, processor and versions, of peers as far as they are installed."""
     cpu = Path("/proc/cpuinfo")
     model = platform.processor()
     if cpu.exists():
         model = next((line.split(": ")[1] for line in cpu.read_text().splitlines() if "model name" in line), model)
-    peers = dict.fromkeys(PEERS, "not installed")
+    peers = {}
     for name in PEERS:
         with suppress(metadata.PackageNotFoundError):
             peers[name] = metadata.version(name)

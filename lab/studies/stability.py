@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.layout import LEFT, Of, V, X
-from grasp_ros.physics.model import Arm, Array
+from grasp_ros.physics.model import Arm
 from grasp_ros.physics.sampled import spectral_radius
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -69,16 +68,3 @@ def limits(arm: Arm, delays: tuple[int, ...] = (0, 1)) -> list[Limit]:
         checks = tuple((h, simulated_growth(arm, h, delay)) for h in near)
         found.append(Limit(delay, period, checks))
     return found
-
-
-def curves(
-    arm: Arm, found: Sequence[Limit]
-) -> tuple[dict[str, tuple[Array, Array]], list[tuple[float, float]], dict[str, float]]:
-    """What `figures.stability` draws: radius against period, simulated growth, and the limits; by delay."""
-    named = {f"delay of {limit.delay} periods": limit for limit in found if math.isfinite(limit.period)}
-    last = 1.3 * max((limit.period for limit in named.values()), default=FIRST_S)
-    periods = np.linspace(last / 300.0, last, 300)
-    radii = {label: (periods, spectral_radius(arm, periods, limit.delay)) for label, limit in named.items()}
-    simulated = [check for limit in named.values() for check in limit.checks]
-    simulated += [(h, simulated_growth(arm, h, limit.delay, 800)) for limit in named.values() for h in periods[30::45]]
-    return radii, simulated, {label: limit.period for label, limit in named.items()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import subprocess
 import sys
 from pathlib import Path
@@ -13,8 +12,8 @@ import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.cli.main import main
+from grasp_ros.physics.errors import needing
 from grasp_ros.physics.observation import CALLABLE
-from lab.__main__ import with_packages
 
 LONG = "a" * 5000
 SECONDS = 60.0
@@ -266,7 +265,7 @@ def test_a_study_without_its_packages_names_the_one_that_is_missing() -> None:
                " sys.exit(main(['hard', '--alone']))")
     result = ran([sys.executable, "-c", program])
     assert result.returncode == 2
-    assert result.stderr == "grasp: this needs gmpy2; run `make laboratory`\n"
+    assert result.stderr == "grasp: this needs gmpy2; pip install gmpy2\n"
 
 
 WITHOUT = """
@@ -305,8 +304,5 @@ def test_a_package_that_is_missing_is_named(
 
 
 def test_a_module_of_ours_that_is_missing_is_a_fault() -> None:
-    def broken(_: Any) -> int:
+    with pytest.raises(ModuleNotFoundError), needing("this"):
         raise ModuleNotFoundError("No module named 'grasp_ros.nothing'", name="grasp_ros.nothing")
-
-    with pytest.raises(ModuleNotFoundError):
-        with_packages(broken, argparse.Namespace())

@@ -13,15 +13,8 @@
   let table = null, run = null, frame = 0, clock = 0, shown = 0, last = null, playing = false, shapes = {}, largest = {};
 
   function decode(each) {
-    const bytes = Uint8Array.from(atob(each.data), (c) => c.charCodeAt(0)), numbers = new Int16Array(bytes.buffer);
-    const found = {};
-    each.columns.forEach((name, place) => {
-      const scale = each.scales[place], low = each.lows[place], column = numbers.subarray(place * each.rows, (place + 1) * each.rows);
-      found[name] = Float64Array.from(column, low === null ? (n) => scale * n : (n) => Math.exp(low + scale * n));
-    });
-    let ticks = 0; // times are steps
-    found.t = Float64Array.from(numbers.subarray(0, each.rows), (step) => (ticks += step) * each.scales[0]);
-    return found;
+    const numbers = new Float32Array(Uint8Array.from(atob(each.data), (c) => c.charCodeAt(0)).buffer);
+    return Object.fromEntries(each.columns.map((name, place) => [name, numbers.subarray(place * each.rows, (place + 1) * each.rows)]));
   }
   const value = (row, name) => table[name][row];
 
