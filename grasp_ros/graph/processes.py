@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -100,7 +101,11 @@ class Graph:
         try:
             with writing(self.directory):
                 self.directory.mkdir(parents=True)
-                scene_file.write_text(self.scene.to_yaml(), encoding="utf-8")
+                try:
+                    scene_file.write_text(self.scene.to_yaml(), encoding="utf-8")
+                except OSError:
+                    shutil.rmtree(self.directory)
+                    raise
         except Refused:
             self.stop()
             raise
