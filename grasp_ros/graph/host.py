@@ -36,6 +36,7 @@ OTHER_WISHES = ("ROS_STATIC_PEERS", SERVER, *PROFILE_FILES)
 MIDDLEWARE, OURS = "RMW_IMPLEMENTATION", "rmw_fastrtps_cpp"  # the one that the profile is for
 LEAST_BYTES = 2**31  # that a node can address: with its libraries and threads it takes up to 1.8e9
 LEAST_FILES = 32  # that a node has open: its libraries, and the sockets of DDS
+LEAST_THREADS = 20  # of a node, most of them of DDS
 SHARED = Path("/dev/shm")  # of Linux; elsewhere there is nothing to find
 LOCK, PREFIX, PORT = "_el", "fastrtps_", "fastrtps_port"  # how Fast DDS names what it has there
 YOUNG_SECONDS = 2.0  # a process may be about to lock what it has just made
@@ -99,6 +100,9 @@ def check_reach(given: Mapping[str, str], alone: bool = False) -> None:
     files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     if 0 <= files < LEAST_FILES:
         raise Refused(f"open files (`ulimit -n`): {files} is not allowed; allowed: {LEAST_FILES} or more")
+    threads, _ = resource.getrlimit(resource.RLIMIT_NPROC)
+    if 0 <= threads < LEAST_THREADS:
+        raise Refused(f"threads (`ulimit -u`): {threads} is not allowed; allowed: {LEAST_THREADS} or more per node")
     domain, reach, middleware = (given.get(name, "") for name in (DOMAIN, RANGE, MIDDLEWARE))
     if domain and not (domain.isascii() and domain.isdecimal() and int(domain) <= MOST_DOMAIN):
         raise Refused(f"{DOMAIN}: {domain!r} is not allowed; allowed: 0 to {MOST_DOMAIN}")

@@ -88,6 +88,8 @@ class Graph:
         Refused
             If the directory exists or cannot be written, the scene has no such controller, the timeout can be none, or
             another graph runs here.
+        Failed
+            If a process cannot be started.
         """
         for name in (*self.without, *self.laws):
             if name not in self.scene.controllers:
@@ -120,6 +122,8 @@ class Graph:
                 self.processes[name] = subprocess.Popen(
                     command, env=environment, start_new_session=True, stdin=end.fileno(), stderr=self.errors
                 )
+        except OSError as error:  # more processes than may be
+            raise Failed(f"{name}: cannot be started: {error.strerror}") from None
         finally:
             end.close()
             signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -285,10 +285,11 @@ def test_a_run_whose_nodes_refuse_what_they_are_given_is_refused(tmp_path: Path,
     [
         ("-v 1000000", "memory (`ulimit -v`): 1000000 kB is not allowed; allowed: 2097152 or more"),
         ("-n 25", "open files (`ulimit -n`): 25 is not allowed; allowed: 32 or more"),
+        ("-u 19", "threads (`ulimit -u`): 19 is not allowed; allowed: 20 or more per node"),  # was a traceback
     ],
 )
 def test_a_limit_in_which_no_node_has_room_is_named(tmp_path: Path, words: list[str], limit: str, said: str) -> None:
-    found = ran("sh", "-c", f'ulimit {limit}; exec "$@"', "sh", *words, cwd=tmp_path)
+    found = ran("bash", "-c", f'ulimit {limit}; exec "$@"', "bash", *words, cwd=tmp_path)
     assert (found.returncode, len(found.stderr.splitlines())) == (2, 1)
     assert said in found.stderr
 
