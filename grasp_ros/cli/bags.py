@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import sys
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
@@ -67,7 +68,7 @@ def _recover(options: argparse.Namespace) -> int:
     from grasp_ros.graph.bag.recover import recover
 
     bag = options.bag if options.bag.name else options.bag.resolve()  # "." has no name
-    new = options.output or bag.parent / f"{bag.name if bag.is_dir() else bag.stem}_recovered"
+    new = options.output or bag.parent / f"{bag.name if os.path.isdir(bag) else bag.stem}_recovered"
     found = recover(options.bag, new)
     for words in found.left_out:
         print(f"left out: {words}")

@@ -118,7 +118,7 @@ def _run(options: argparse.Namespace) -> int:
     if not kernels_on_disk():  # otherwise the plant alone loads them
         prepare()
         spent.append((time.monotonic(), "compilation"))
-    first = not directory.parent.exists()
+    first = not os.path.exists(directory.parent)
     graph = Graph(
         scene, directory, options.accuracy, progress=True, without=options.without, laws=laws,
         plant=plant, one_process=options.one_process, namespace=options.namespace,

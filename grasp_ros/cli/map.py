@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -76,7 +77,7 @@ def _map(options: argparse.Namespace) -> int:
     columns = find(outcomes)
     pictures = {column.name: options.output.with_name(f"{options.output.stem}_{column.name}.png") for column in columns}
     for path in pictures.values():
-        if path.exists() and not options.output.exists():
+        if os.path.exists(path) and not os.path.exists(options.output):
             raise Refused(f"{path}: already exists; allowed: an output whose figures beside it are new")
     check_fits(f"{scene.name}: runs", plan.rows, 2 * (len(axes) + len(columns)))  # in chunks, and joined
     prepare()

@@ -48,7 +48,7 @@ def bar(total: float | None, unit: str, name: str) -> AbstractContextManager[Cal
 def show(options: argparse.Namespace, text: str, data: Any) -> None:
     """Print a result: its text, or with `--json` its data; on the standard error if a file goes to the output."""
     stop_if_signalled()
-    shown = json.dumps(plain(data), indent=1, ensure_ascii=False) if options.json else text
+    shown = json.dumps(plain(data), indent=1) if options.json else text
     stream = sys.stderr if getattr(options, "output", None) == STDOUT else sys.stdout
     try:
         print(shown, file=stream)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -72,7 +73,7 @@ def _simulate(options: argparse.Namespace) -> int:
         if other != knob and number not in (None, ACCURACY):
             raise Refused(f"--{other} is not allowed; allowed for {options.method}: --{knob}")
     check_output(options.output, (".npz", ".csv"), options.force, [options.scene])
-    here = os.open(".", os.O_RDONLY)
+    here = os.getcwd()
     controllers = load_controllers(options.controllers)
     sampled = options.sampled or bool(controllers)
     check_memory(scene, sampled, options.grid)
@@ -89,8 +90,8 @@ def _simulate(options: argparse.Namespace) -> int:
             sensitivity=options.sensitivity or None,
             progress=None if knob == STEP else progress,
         )
-    os.fchdir(here)  # a controller, or its module, may have called os.chdir
-    os.close(here)
+    with suppress(OSError):  # one that this user may not enter, `sudo -u` say, or that was moved: we are still there
+        os.chdir(here)  # a controller, or its module, may have called os.chdir
     found = summary(trajectory)
     rows = describe_trajectory(trajectory, found)
     rates = trajectory.sensitivity

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -87,6 +88,8 @@ class Graph:
         Refused
             If the directory exists or cannot be written, the scene has no such controller, the timeout can be none, or
             another graph runs here.
+        Failed
+            If a process cannot be started.
         """
         for name in (*self.without, *self.laws):
             if name not in self.scene.controllers:
@@ -100,7 +103,11 @@ class Graph:
         try:
             with writing(self.directory):
                 self.directory.mkdir(parents=True)
-                scene_file.write_text(self.scene.to_yaml(), encoding="utf-8")
+                try:
+                    scene_file.write_text(self.scene.to_yaml(), encoding="utf-8")
+                except OSError:
+                    shutil.rmtree(self.directory)
+                    raise
         except Refused:
             self.stop()
             raise
@@ -115,6 +122,8 @@ class Graph:
                 self.processes[name] = subprocess.Popen(
                     command, env=environment, start_new_session=True, stdin=end.fileno(), stderr=self.errors
                 )
+        except OSError as error:  # more processes than may be
+            raise Failed(f"{name}: cannot be started: {error.strerror}") from None
         finally:
             end.close()
             signal.pthread_sigmask(signal.SIG_SETMASK, before)

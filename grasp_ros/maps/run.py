@@ -44,7 +44,7 @@ def run(
     or cannot be written, workers that die again and again; what is done is kept.
     """
     path, report = Path(path), progress or (lambda _: None)
-    store = Store(path, plan) if path.exists() else None
+    store = Store(path, plan) if os.path.exists(path) else None
     rows = 1 if store else chunk_rows(plan.scene, plan.setup, _seconds(plan))
     on_others = (workers or scheduler) and (store is None or store.spans)  # a map that is done needs no cluster
     # First, so that a scheduler that does not answer leaves no file behind.

@@ -39,11 +39,11 @@ class Store:
         self.path, self.plan = path, plan
         wanted = json.loads(json.dumps(plan.to_document()))
         self._lines = plan.rows // plan.shape[0]
-        if not path.exists():
+        if not os.path.exists(path):
             try:
                 _to_its_end(_create, path, plan, wanted, max(1, rows // self._lines))
             except Refused:
-                if not path.exists():  # otherwise another process has made it meanwhile
+                if not os.path.exists(path):  # otherwise another process has made it meanwhile
                     raise
         self._group = open_group(path, "r+")
         made, allowed = self._group.attrs["versions"], "allowed: a new path, or a map of the same"

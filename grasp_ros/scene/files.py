@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import struct
-import threading
+import uuid
 import zlib
 from collections.abc import Collection, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -85,11 +85,12 @@ def replacing(path: object) -> Iterator[BinaryIO]:
 @contextmanager
 def replaced(path: Path) -> Iterator[Path]:
     """The name of a file or a directory, with the same ending, that takes the place of another when it is whole."""
-    part = path.with_name(f".{path.stem[:200]}.{threading.get_native_id()}.part{path.suffix}")
+    there = Path(os.path.realpath(path))  # where a link leads, another disk say
+    part = there.with_name(f".{path.stem[:50]}.{uuid.uuid4().hex}.part{path.suffix}")  # at most 255 bytes
     with writing(path):
         try:
             yield part
-            part.replace(path.resolve())
+            part.replace(there)
         finally:
             if part.is_dir():
                 shutil.rmtree(part)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -239,6 +241,27 @@ def test_a_title_that_the_terminal_cannot_show_is_printed_all_the_same(
     result = ran([sys.executable, "-m", "grasp_ros.cli", "simulate", str(tmp_path / "mine.yaml")])
     assert result.returncode == 0, result.stderr
     assert "\\xe4" in result.stdout
+    result = ran([sys.executable, "-m", "grasp_ros.cli", "scenes", str(tmp_path / "mine.yaml"), "--json"])
+    assert json.loads(result.stdout)["title"] == "ä"  # it was no JSON
+
+
+@pytest.mark.slow
+def test_directories_of_others_are_refused_in_a_line(tmp_path: Path) -> None:
+    """They were tracebacks, also where the working directory is one, as after `sudo -u`."""
+    own = [] if os.getuid() else ["setpriv", "--bounding-set", "-dac_override,-dac_read_search"]  # root as a user
+    if own and subprocess.run([*own, "true"], capture_output=True, check=False).returncode:
+        pytest.skip("no capability may be given up here")
+    shut = tmp_path / "shut"
+    shut.mkdir()
+    grasp = f"exec {' '.join(own)} {sys.executable} -P -m grasp_ros.cli -q"
+    for words, door in (("recover shut/bag/bag", "shut/bag/bag: cannot be read"),
+                        ("run case_01 -o shut/of/run", "shut/of/run: cannot be written"),
+                        ("map case_01 --x object.mass_kg=4:6:2 -o shut/of/m.zarr", "shut/of/m.zarr: cannot be written"),
+                        ("simulate arm_alone", "")):
+        result = ran(["sh", "-c", f"cd {tmp_path if door else shut}; chmod 0 {shut}; {grasp} {words}"])
+        shut.chmod(0o700)
+        assert result.stderr.removeprefix("grasp: ") == (f"{door}: Permission denied\n" if door else "")
+        assert result.returncode == (2 if door else 0)
 
 
 @pytest.mark.parametrize("program", ["cli simulate case_01", "cli run case_01 --one-process", "graph plant"])

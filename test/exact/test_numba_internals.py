@@ -130,6 +130,14 @@ def test_kernels_that_cannot_be_kept_where_they_belong_are_kept_among_temporary_
     kernel_cache.cache_directory.cache_clear()
 
 
+def test_a_user_without_a_home_has_kernels_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a container, with a number for a user: it was a traceback."""
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("os.path.expanduser", lambda path: path)
+    assert kernel_cache._base() == Path("/~/.cache/grasp_ros")  # which cannot be made: see the test above
+
+
 @pytest.mark.slow
 @pytest.mark.thorough
 def test_processes_that_write_at_once_leave_whole_files(tmp_path: Path) -> None:

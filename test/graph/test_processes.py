@@ -15,7 +15,10 @@ import numpy as np
 import pytest
 from processes import DEADLINE, GRASP, START, children, growing, ran, wait_for
 
+from grasp_ros import scene
 from grasp_ros.graph import bag, host
+from grasp_ros.graph.processes import Graph
+from grasp_ros.physics.errors import Failed
 from grasp_ros.scene.topics import JOINT_STATES
 
 pytestmark = pytest.mark.slow
@@ -41,6 +44,17 @@ def survivors(tmp_path: Path) -> Iterator[None]:
     yield
     for process in children(tmp_path).values():
         os.kill(process, signal.SIGKILL)
+
+
+def test_a_process_that_cannot_be_started_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*_: Any, **__: Any) -> None:
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(subprocess, "Popen", none)
+    graph = Graph(scene.load("case_01"), tmp_path / "run", 1e-16)
+    with pytest.raises(Failed, match="monitor: cannot be started: Resource temporarily unavailable"):
+        graph.start()
+    graph.stop()
 
 
 @pytest.mark.usefixtures("survivors")

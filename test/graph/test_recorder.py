@@ -37,7 +37,9 @@ from grasp_ros.graph.bag.recorder import HEAD, NOT_RECORDED, RESERVE_BYTES, Reco
 from grasp_ros.graph.bag.recover import recover
 from grasp_ros.graph.bag.rosbag2 import INFORMATION, decode
 from grasp_ros.graph.bag.storage import DATA_END_BYTES, SUM
+from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.serialization import template_of
+from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.topics import COMMANDS, CONTACTS, DIAGNOSTICS, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, Topic
 from grasp_ros.simulation import Trajectory, simulate
 from lab.drills import recorder as study
@@ -493,6 +495,22 @@ def test_a_full_disk_ends_the_bag_while_there_is_room(tmp_path: Path) -> None:
     assert int(ticks) >= int(number) >= 500
     assert end == "no space is left on the disk"
     assert "the bag is closed, and whole up to there" in sentence
+
+
+def test_a_disk_that_is_full_at_the_first_byte_is_left_as_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Trajectory
+) -> None:
+    """The next one, with space, was told that the directory is there."""
+    def full(*_: Any, **__: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Recorder, "_begin", full)
+    with pytest.raises(bag.BagError, match="bag: cannot be written: No space left on device"):
+        Recorder(tmp_path / "bag", run.scene, {})
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(Refused, match="run: cannot be written: No space left on device"):
+        Graph(run.scene, tmp_path / "run", 1e-16).start()
+    assert not [*tmp_path.iterdir()]
 
 
 @pytest.mark.slow

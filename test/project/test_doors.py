@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 import sys
+import threading
 import time
 import zipfile
 from dataclasses import replace
@@ -22,6 +23,7 @@ from grasp_ros import simulation
 from grasp_ros.accuracy.measure import Record
 from grasp_ros.physics.errors import LONGEST, Refused
 from grasp_ros.scene import npz
+from grasp_ros.scene.files import replaced
 from grasp_ros.scene.npz import signed
 from grasp_ros.scene.strict_yaml import MOST_NODES
 from grasp_ros.simulation import plots, simulate
@@ -237,6 +239,22 @@ def test_a_write_that_fails_leaves_what_was_there(tmp_path: Path, monkeypatch: p
         simulate(scenes.load("arm_alone")).save(tmp_path / "a.npz")
     assert (tmp_path / "a.npz").read_bytes() == b"precious"
     assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_what_is_half_done_lies_where_the_file_will_be_under_a_name_of_its_own(tmp_path: Path) -> None:
+    """A link to another disk, a long name, and a part that a killed process has left under our number were refused."""
+    there = tmp_path / "there"
+    there.mkdir()
+    links = {name: tmp_path / f"{name}.npz" for name in ("link", "loop", "漢" * 80)}
+    links["link"].symlink_to(there / "other")
+    links["loop"].symlink_to(links["loop"])
+    (tmp_path / f".link.{threading.get_native_id()}.part.npz").touch()
+    for name, link in links.items():
+        with replaced(link) as part:
+            assert (part.parent, part.suffix) == (there if name == "link" else tmp_path, ".npz")
+            part.touch()
+        assert link.is_file()
+    assert [path.name for path in there.iterdir()] == ["other"]
 
 
 @pytest.mark.parametrize("title", ["costs $5 and $x^{, Größe äöü", "\\frac{$" + "x" * 5000])

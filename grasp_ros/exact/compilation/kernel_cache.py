@@ -31,7 +31,8 @@ def sources_digest() -> str:
 
 
 def _base() -> Path:
-    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    home = Path("/", os.path.expanduser("~"))  # "/~" of a user without one, in a container say: it cannot be made
+    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or home / ".cache"
     return Path(base) / "grasp_ros"
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 import struct
 import threading
 from collections.abc import Iterable, Iterator, Mapping
@@ -116,8 +117,12 @@ class Recorder:
         self._clock = template_of(CLOCK)
         with writing(path, BagError):
             path.mkdir(parents=True)
-            self._sink = Sink(path / f"{path.name}.mcap", path / ".reserve")
-            self._begin()
+            try:
+                self._sink = Sink(path / f"{path.name}.mcap", path / ".reserve")
+                self._begin()
+            except OSError:
+                shutil.rmtree(path)
+                raise
         self._thread = threading.Thread(target=self._flush_regularly, name="recorder", daemon=True)
         self._thread.start()
 
