@@ -9,9 +9,11 @@ import math
 from collections.abc import Callable
 
 from grasp_ros import scene as scenes
+from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene
 from lab.cases.degenerate_starts import SIDES, STARTS, Sections, Sketch, ulps
 from lab.cases.draw import Draw, draw_ordinary
+from lab.cases.scenes import side_sections
 
 ORDINARY = 0.15  # part of all draws
 
@@ -112,13 +114,10 @@ def _sections(sketch: Sketch) -> Sections:
     for k, side in enumerate(SIDES):
         (spring, gain), (damper, rate) = ([min(number, 1e12) for number in numbers[k]]
                                           for numbers in (sketch.springs, sketch.dampers))
-        sections[f"{side}_arm"] = {
-            "mass_kg": sketch.mass[2 * k], "stiffness_N_per_m": spring, "damping_Ns_per_m": damper,
-            "position_m": sketch.x[2 * k], "velocity_m_per_s": sketch.v[2 * k],
-        }
-        targets = {key: min(max(value, -1e12), 1e12) for key, value in sketch.targets[k].items()}
-        sections[f"{side}_feedback"] = {"position_gain_N_per_m": gain, "velocity_gain_Ns_per_m": rate, **targets}
-        sections[f"{side}_contact"] = {"hertz_N_per_m1_5": sketch.hertz[k], "dissipation_s_per_m": sketch.loss[k]}
+        arm, contact = Arm(sketch.mass[2 * k], spring, damper, gain, rate), Contact(sketch.hertz[k], sketch.loss[k])
+        sections |= side_sections(side, arm, contact, sketch.x[2 * k], sketch.v[2 * k])
+        for key, value in sketch.targets[k].items():
+            sections[f"{side}_feedback"][key] = min(max(value, -1e12), 1e12)
     return sections
 
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Entry
 from grasp_ros.physics.model import Arm, Array, Contact
 from grasp_ros.scene import Scene
-from lab.cases.case import Case, Product, Solver, recorded
+from lab.cases.case import Case, Product, Solver
 from lab.cases.families import RELATION
 from lab.cases.scenes import ELASTIC, distance, grasp, library, part
 
@@ -21,7 +21,7 @@ SWAPPED = [4, 5, 2, 3, 0, 1]
 FLIP = np.array([1.0, -1.0] * 3)  # backwards in time
 DIRECTED = ("position_m", "velocity_m_per_s", "set_point_m", "feed_forward_N", "force_N", "angle_rad")
 PAIRED = {"left": "right", "right": "left"}
-OTHER_SIDE = {LEFT: RIGHT, RIGHT: LEFT, OBJECT: OBJECT}
+OTHER_SIDE = np.array([RIGHT, LEFT, OBJECT], dtype=float)
 
 
 def mirrored(scene: Scene) -> Scene:
@@ -69,24 +69,34 @@ def started(scene: Scene, state: Array) -> Scene:
 
 
 def mirror(scene: Scene, solver: Solver) -> float:
-    """Largest difference between a scene and its mirror image; the recorded events must be equal, too."""
+    """Largest difference between a scene and its mirror image; inf if the recorded events are others."""
     times = part(scene, 201)
-    here, own = solver.states(scene, times), recorded(solver)
-    there, image = solver.states(mirrored(scene), times), recorded(solver)
-    if own is not None and sorted(own) != sorted(event._replace(side=OTHER_SIDE[event.side]) for event in image or ()):
-        return np.inf
-    return float(np.abs(here + there[:, SWAPPED]).max())
+    here, own = _solved(scene, times, solver)
+    there, image = _solved(mirrored(scene), times, solver)
+    image[:, Entry.BODY] = OTHER_SIDE[image[:, Entry.BODY].astype(int)]
+    return _apart(here, -there[:, SWAPPED], own, image)
 
 
 def scaling(length: float, time: float, mass: float, scene: Scene, solver: Solver) -> float:
-    """Largest difference between a scene and itself in other units; the recorded events must be equal, too."""
+    """Largest difference between a scene and itself in other units; inf if the recorded events are others."""
     times = part(scene, 201)
-    here, own = solver.states(scene, times), recorded(solver)
-    there, image = solver.states(scaled(scene, length, time, mass), time * times), recorded(solver)
-    expected = [(time * event.time, event.side, event.kind) for event in own or ()]
-    if expected != [(event.time, event.side, event.kind) for event in image or ()]:
-        return np.inf
-    return float(np.abs(here * np.array([length, length / time] * 3) - there).max())
+    here, own = _solved(scene, times, solver)
+    there, image = _solved(scaled(scene, length, time, mass), time * times, solver)
+    moved = np.array([length, length / time])
+    return _apart(here * np.tile(moved, 3), there, own * np.array([time, 1.0, 1.0, *moved]), image)
+
+
+def _solved(scene: Scene, times: Array, solver: Solver) -> tuple[Array, Array]:
+    """States, 0 of what is not there, and the events that the product recorded; none of another solver."""
+    states = solver.states(scene, times).copy()
+    states[:, scene.system.absent_columns] = 0.0
+    return states, solver.runs[-1].event_table.copy() if isinstance(solver, Product) else np.zeros((0, len(Entry)))
+
+
+def _apart(here: Array, there: Array, own: Array, image: Array) -> float:
+    """Largest difference of states whose events are the same in any order: which side is looked at first is open."""
+    same = sorted(own.tolist()) == sorted(image.tolist())
+    return float(np.abs(here - there).max()) if same else np.inf
 
 
 def reversal(scene: Scene, solver: Solver) -> float:
