@@ -13,7 +13,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from tqdm import tqdm
@@ -31,15 +31,6 @@ CHUNK = 50  # draws that a process does at once
 COMPARED = 5000  # every how many scenes one is compared with the reference
 
 
-class Drawn(NamedTuple):
-    """What became of one draw."""
-
-    number: int
-    degeneracies: str
-    found: Examination
-    yaml: str  # empty if all properties hold
-
-
 @dataclass
 class Tally:
     """How often a property was checked, and how often it failed."""
@@ -49,10 +40,6 @@ class Tally:
     failures: int = 0
     worst: float = 0.0
     where: int = 0  # number of the worst draw
-
-    def add(self, check: Check, number: int) -> None:
-        """Count a check."""
-        self.merge(Tally(1, check.skipped, int(not check.holds), check.error, number))
 
     def merge(self, other: Tally) -> None:
         """Count those of later draws, too."""
@@ -77,17 +64,6 @@ class Book:
     def broken(self) -> int:
         """Number of scenes that fail."""
         return len(self.scenes)
-
-    def add(self, drawn: Drawn) -> None:
-        """Count a draw."""
-        self.ends[drawn.found.end] += 1
-        names = drawn.degeneracies.split(", ")
-        self.degeneracies.update(names)
-        for check in drawn.found.checks:
-            self.tallies.setdefault(check.name, Tally()).add(check, drawn.number)
-        if drawn.found.broken:
-            self.scenes[drawn.number] = drawn.yaml
-            self.broken_degeneracies.update(names)
 
     def merge(self, other: Book) -> None:
         """Count later draws, too."""
@@ -125,19 +101,26 @@ def check_draws(seed: int, numbers: Iterable[int]) -> Book:
     """Draw scenes and check them; an exception is a failure."""
     book = Book()
     for number in numbers:
-        book.add(_check(number, draw(seed, number)))
+        book.merge(_check(number, draw(seed, number)))
     return book
 
 
-def _check(number: int, scene: Scene) -> Drawn:
+def _check(number: int, scene: Scene) -> Book:
+    """What became of one draw."""
     try:
         found = examine(scene, every=False, compare=number % COMPARED == 0)
     except Exception:
         reason = traceback.format_exc().strip().splitlines()
         found = Examination("traceback", [Check(f"traceback: {reason[-1][:60]}", 1.0, 0.0)])
-    names = "; ".join(f"{check.name} {check.error:.2g}" for check in sorted(found.broken, key=lambda one: -one.error))
-    yaml = f"# {number}: {names}\n{scene.to_yaml()}" if found.broken else ""
-    return Drawn(number, scene.title, found, yaml)
+    book = Book(Counter([found.end]), degeneracies=Counter(scene.title.split(", ")))
+    for check in found.checks:
+        tally = Tally(1, check.skipped, int(not check.holds), check.error, number)
+        book.tallies.setdefault(check.name, Tally()).merge(tally)
+    if broken := sorted(found.broken, key=lambda check: -check.error):
+        names = "; ".join(f"{check.name} {check.error:.2g}" for check in broken)
+        book.scenes[number] = f"# {number}: {names}\n{scene.to_yaml()}"
+        book.broken_degeneracies = book.degeneracies.copy()
+    return book
 
 
 def run(seed: int, directory: Path, *, seconds: float | None = None, draws: int | None = None, first: int = 0,

@@ -20,11 +20,7 @@ ROOMS = "grasp_ros/scene", "grasp_ros/simulation", "lab/reference", "lab/cases",
 class Line(NamedTuple):
     """The book of a chunk of draws in the journal."""
 
-    ends: str  # JSON, as all of them
-    tallies: str
-    degeneracies: str
-    broken_degeneracies: str
-    scenes: str
+    book: str  # JSON
 
 
 class Kept:
@@ -49,15 +45,13 @@ class Kept:
         line = self._journal.get(self._key(numbers), Line)
         if line is None:
             return None
-        ends, tallies, degeneracies, broken, scenes = map(json.loads, line)
-        return Book(Counter(ends), {name: Tally(*tally) for name, tally in tallies.items()}, Counter(degeneracies),
+        ends, tallies, degeneracies, broken, scenes = json.loads(line.book).values()
+        return Book(Counter(ends), {name: Tally(**tally) for name, tally in tallies.items()}, Counter(degeneracies),
                     Counter(broken), {int(number): yaml for number, yaml in scenes.items()})
 
     def put(self, numbers: range, book: Book) -> None:
         """Keep what became of these draws."""
-        tallies = {name: list(vars(tally).values()) for name, tally in book.tallies.items()}
-        parts = (book.ends, tallies, book.degeneracies, book.broken_degeneracies, book.scenes)
-        self._journal.put(self._key(numbers), Line(*map(json.dumps, parts)))
+        self._journal.put(self._key(numbers), Line(json.dumps(vars(book), default=vars)))
 
 
 def write_page(docs: Path, seed: int, first: int, book: Book) -> None:
