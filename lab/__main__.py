@@ -13,7 +13,7 @@ from grasp_ros.physics.errors import Refused
 from lab.commands import COMMANDS
 
 # names of modules of the extra `lab`
-PACKAGES = ("gmpy2", "heyoka", "jinja2", "mpmath", "ruamel", "scipy", "sksundae", "xarray", "zarr")
+PACKAGES = ("gmpy2", "heyoka", "jinja2", "mpmath", "psutil", "ruamel", "scipy", "sksundae", "xarray", "zarr")
 ABOUT = "Measure, and print what was measured. Those with --docs write a page; `make study` writes all pages."
 
 

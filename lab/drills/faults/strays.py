@@ -115,9 +115,7 @@ def _second(stage: Stage, name: str = "left_controller", words: Any = (), number
 
 
 def _second_run(stage: Stage) -> None:
-    words = stage.run_words()
-    words[words.index("-o") + 1] = str(stage.place / "second")
-    stage.start("second run", words)
+    stage.start("second run", stage.run_words(place="second"))
     stage.wait(lambda: stage.ended("second run"), 20.0)
     stage.happens()
 
