@@ -44,18 +44,14 @@ def scaled(scene: Scene, length: float, time: float, mass: float) -> Scene:
     """The scene in other units, O7; exact for powers of 4, 2 and 2."""
     force = mass * length / time**2
     factors = {
-        "mass_kg": mass, "stiffness_N_per_m": mass / time**2, "damping_Ns_per_m": mass / time,
-        "position_gain_N_per_m": mass / time**2, "velocity_gain_Ns_per_m": mass / time, "position_m": length,
-        "velocity_m_per_s": length / time, "hertz_N_per_m1_5": mass / (time**2 * math.sqrt(length)),
-        "dissipation_s_per_m": time / length, "duration_s": time, "control_period_s": time,
-        "set_point_m": length, "feed_forward_N": force, "force_N": force, "coulomb_N": force,
-        "viscous_Ns_per_m": mass / time, "start_s": time, "length_s": time, "angle_rad": 1.0,
-        "gravity_m_per_s2": length / time**2, "time_s": time, "amplitude_N": force, "frequency_Hz": 1.0 / time,
-        "phase_rad": 1.0, "limit_N": force, "position_noise_m": length, "velocity_noise_m_per_s": length / time,
-        "position_step_m": length, "velocity_step_m_per_s": length / time,
+        "kg": mass, "m": length, "s": time, "N": force, "Hz": 1.0 / time, "m/s": length / time,
+        "m/s^2": length / time**2, "N/m": mass / time**2, "N s/m": mass / time, "s/m": time / length,
+        "N/m^1.5": mass / (time**2 * math.sqrt(length)),
     }
+    units = {parameter.key: parameter.unit for effect in scene.effects for parameter in effect.parameters}
     return scenes.compose(scene.name, {
-        section: {key: _times(value, factors[key]) if key in factors else value for key, value in numbers.items()}
+        section: {key: _times(value, factors[units[key]]) if units[key] in factors else value
+                  for key, value in numbers.items()}
         for section, numbers in scene.values.items()
     })
 

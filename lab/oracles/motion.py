@@ -141,8 +141,7 @@ def _beyond(change: Array, friction: tuple[Array, Array], unit: Array) -> Array:
     low, high = friction
     outside = np.maximum(np.maximum(-change - high, low + change), 0.0)
     scale = unit + EPS * np.maximum(np.abs(low), np.abs(high))
-    found: Array = outside / scale
-    return found
+    return np.asarray(outside / scale)
 
 
 def _bodies(detail: Detail, pairs: list[Impacts], own: tuple[Array, Array, Array], friction: tuple[Array, Array],

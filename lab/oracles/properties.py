@@ -121,8 +121,8 @@ def _checks(first: Trajectory, product: Product, every: bool, compare: bool) -> 
     if first.sampled:
         yield Check("held inputs", _held(first), 0.0)
     yield from _balances(close, product)
-    for finding in findings(close):
-        yield Check(finding.name, finding.error, LIMIT)
+    for name, error in findings(close):
+        yield Check(name, error, LIMIT)
     spent = int(run.work[Work.FLIGHTS] + run.work[Work.CONTACT_STEPS] + run.work[Work.ROOT_ITERATIONS])
     if spent <= CHEAP:
         yield from _related_runs(close, first, product, every, compare)

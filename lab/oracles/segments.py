@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 from itertools import pairwise
 from typing import NamedTuple
@@ -26,6 +27,7 @@ GRADING = 0.2  # length of one level by that of the next
 CUTS, CUT, PARTS = 12, 0.1, 8  # levels, their grading, and equal parts of a piece that is looked at more closely
 SHORTEST = 64.0 * EPS  # of a piece, relative to its time: nodes must differ
 INNER, FIRST, LAST, WHOLE = range(4)  # which ends of a piece are ends of its segment
+Part = tuple[float, float, int, int]  # begin, end, kind and segment of a piece
 PLACES = [COLUMN[body] for body in (LEFT, RIGHT, OBJECT)]
 
 
@@ -43,7 +45,12 @@ class Pieces(NamedTuple):
     begin: Array  # (k,) s
     end: Array  # (k,) s
     kind: NDArray[np.int64]  # (k,) INNER, FIRST, LAST or WHOLE
-    segment: NDArray[np.int64]  # (k,) number of the segment
+    segment: NDArray[np.int64]  # (k,) number of the segment, ascending
+
+    @property
+    def first(self) -> NDArray[np.int64]:
+        """The first piece (k,) of the segment of each."""
+        return np.asarray(np.searchsorted(self.segment, self.segment))
 
 
 class Detail(NamedTuple):
@@ -72,8 +79,7 @@ class Detail(NamedTuple):
 
 def _sums(weights: Array, values: Array) -> Array:
     """Sums (k, ...) of values (k, n, ...) by weights (k, n)."""
-    found: Array = np.einsum("kn,kn...->k...", weights, values)
-    return found
+    return np.asarray(np.einsum("kn,kn...->k...", weights, values))
 
 
 @cache
@@ -108,36 +114,36 @@ def pieces_of(run: Trajectory) -> Pieces:
     near = GRADING ** np.arange(levels, 0.0, -1.0)
     middle = np.linspace(near[-1], 1.0 - near[-1], min(max(each - 2 * levels, MIDDLE[0]), MIDDLE[1]) + 1)[1:-1]
     cuts = np.concatenate([[0.0], near, middle, 1.0 - near[::-1], [1.0]])
-    rows = []
+    rows: list[Part] = []
     for number, (a, b) in enumerate(spans):
-        at = a + (b - a) * cuts
-        at[-1] = b
-        at = at[np.concatenate([[True], np.diff(at) > SHORTEST * b])]
-        at[-1] = b
-        last = len(at) - 2
-        for k, (begin, end) in enumerate(pairwise(at.tolist())):
-            rows.append((begin, end, FIRST * (k == 0) + LAST * (k == last), number))
+        rows += _parts(a, b, cuts, WHOLE, number)
     return _table(rows)
 
 
 def cut(pieces: Pieces, where: NDArray[np.bool_]) -> tuple[Pieces, NDArray[np.int64]]:
     """Some pieces cut into parts, ever shorter ones at both ends, where a layer may hide; also the first of each."""
     near = CUT ** np.arange(CUTS, 1.0, -1.0)
-    share = np.concatenate([[0.0], near, np.linspace(CUT, 1.0 - CUT, PARTS + 1), 1.0 - near[::-1]])
+    share = np.concatenate([[0.0], near, np.linspace(CUT, 1.0 - CUT, PARTS + 1), 1.0 - near[::-1], [1.0]])
     first: list[int] = []
-    rows: list[tuple[float, float, int, int]] = []
+    rows: list[Part] = []
     for begin, end, kind, number, cuts in zip(*pieces, where, strict=True):
         first.append(len(rows))
-        at = begin + (end - begin) * (share if cuts else share[:1])
-        at = np.append(at[np.concatenate([[True], np.diff(at) > SHORTEST * end])], end)
-        last = len(at) - 2
-        for k, (a, b) in enumerate(pairwise(at.tolist())):
-            rows.append((a, b, kind & (FIRST * (k == 0) | LAST * (k == last)), number))
+        rows += _parts(begin, end, share if cuts else share[[0, -1]], kind, number)
     return _table(rows), np.array(first)
 
 
-def _table(rows: list[tuple[float, float, int, int]]) -> Pieces:
-    """Pieces of rows with begin, end, kind and segment."""
+def _parts(begin: float, end: float, share: Array, kind: int, segment: int) -> Iterator[Part]:
+    """Parts of a piece, cut at ascending shares of it from 0 to 1, but none that is too short."""
+    at = begin + (end - begin) * share[:-1]
+    keep = np.minimum(np.diff(at, prepend=-np.inf), end - at) > SHORTEST * end
+    keep[0] = True
+    at = np.append(at[keep], end)
+    last = len(at) - 2
+    for k, (a, b) in enumerate(pairwise(at.tolist())):
+        yield a, b, kind & (FIRST * (k == 0) | LAST * (k == last)), segment
+
+
+def _table(rows: list[Part]) -> Pieces:
     table = np.array(rows).reshape(-1, 4)
     return Pieces(table[:, 0], table[:, 1], table[:, 2].astype(np.int64), table[:, 3].astype(np.int64))
 
