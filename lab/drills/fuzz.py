@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from lab.drills.random_scenes import Kept
 
 CHUNK = 50  # draws that a process does at once
+TABLES = {  # headers
+    "ends": ["scenes", "end"], "properties": ["property", "checked", "skipped", "failures", "worst", "draw"],
+    "degeneracies": ["degeneracy", "drawn", "failures"],
+}
 COMPARED = 5000  # every how many scenes one is compared with the reference
 
 
@@ -74,22 +78,27 @@ class Book:
         for name, tally in other.tallies.items():
             self.tallies.setdefault(name, Tally()).merge(tally)
 
-    def by_failures(self) -> list[tuple[str, Tally]]:
-        """All properties, those that fail most often first."""
-        return sorted(self.tallies.items(), key=lambda item: (-item[1].failures, item[0]))
+    def tables(self) -> dict[str, list[list[str]]]:
+        """Rows, see TABLES: the largest numbers first, equal ones by their names."""
+        tallies = sorted(self.tallies.items(), key=lambda item: (-item[1].failures, item[0]))
+        return {
+            "ends": [[str(number), text] for text, number in _ordered(self.ends)],
+            "properties": [[name, str(tally.checked), str(tally.skipped), str(tally.failures), f"{tally.worst:.2g}",
+                            str(tally.where)] for name, tally in tallies],
+            "degeneracies": [[name, str(number), str(self.broken_degeneracies[name])]
+                             for name, number in _ordered(self.degeneracies)],
+        }
 
     def show(self) -> None:
         """Print all tables."""
-        for text, number in self.ends.most_common():
-            print(f"  {number:8}  {text}")
-        print(f"  {'checked':>8}  {'skipped':>8}  {'failures':>8}  {'worst':>8}  {'draw':>8}  property")
-        for name, tally in self.by_failures():
-            counts = f"{tally.checked:8}  {tally.skipped:8}  {tally.failures:8}"
-            print(f"  {counts}  {tally.worst:8.2g}  {tally.where:8}  {name}")
-        print(f"  {'drawn':>8}  {'failures':>8}  degeneracy")
-        for name, number in self.degeneracies.most_common():
-            print(f"  {number:8}  {self.broken_degeneracies[name]:8}  {name}")
+        for name, rows in self.tables().items():
+            for row in [TABLES[name], *rows]:
+                print(*(f"{cell:>8}" for cell in row), sep="  ")
         print(f"failures: {self.broken}")
+
+
+def _ordered(counts: Counter[str]) -> list[tuple[str, int]]:
+    return sorted(counts.items(), key=lambda item: (-item[1], item[0]))
 
 
 def draw(seed: int, number: int) -> Scene:

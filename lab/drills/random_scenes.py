@@ -64,15 +64,4 @@ def write_page(docs: Path, seed: int, first: int, book: Book) -> None:
     """
     failures = [[f"`--seed {seed} --first {number} --draws 1`", yaml.splitlines()[0].split(": ", 1)[1]]
                 for number, yaml in sorted(book.scenes.items())]
-    properties = [[name, *map(str, (tally.checked, tally.skipped, tally.failures)), f"{tally.worst:.2g}",
-                   str(tally.where)] for name, tally in book.by_failures()]
-    degeneracies = [[name, str(number), str(book.broken_degeneracies[name])]
-                    for name, number in _ordered(book.degeneracies)]
-    ends = [[str(number), text] for text, number in _ordered(book.ends)]
-    pages.write(docs, "fuzz", seed=seed, first=first, draws=book.ends.total(), failures=failures, ends=ends,
-                properties=properties, degeneracies=degeneracies)
-
-
-def _ordered(counts: Counter[str]) -> list[tuple[str, int]]:
-    """The largest first; equal ones by their names."""
-    return sorted(counts.items(), key=lambda item: (-item[1], item[0]))
+    pages.write(docs, "fuzz", seed=seed, first=first, draws=book.ends.total(), failures=failures, **book.tables())

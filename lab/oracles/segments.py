@@ -65,16 +65,16 @@ class Detail(NamedTuple):
     bodies: Array  # (k, 3, 4): m, K, C, f as they act in a piece, see `layout`
 
     def integral(self, values: Array) -> tuple[Array, Array]:
-        """Integrals (k, ...) over the pieces of values (k, n, ...) at the inner nodes, and the error's estimate.
+        """Integrals (k, ...) over the pieces of values (k, n + 2, ...), and the error's estimate.
 
         That is the larger of two differences: where the nodes are too few for a motion one may vanish by chance.
         """
-        fine, *coarse = (_sums(table, values) for table in self.weights)
+        fine, *coarse = (_sums(table, values[:, 1:-1]) for table in self.weights)
         return fine, np.maximum(*(np.abs(fine - other) for other in coarse))
 
     def total(self, values: Array) -> Array:
-        """The integrals alone."""
-        return _sums(self.weights[0], values)
+        """Integrals (k, ...) of the size of values (k, n + 2, ...)."""
+        return _sums(self.weights[0], np.abs(values[:, 1:-1]))
 
 
 def _sums(weights: Array, values: Array) -> Array:
