@@ -94,11 +94,11 @@ def draw_degenerate(draw: Draw) -> Scene:
     sketch = Sketch(draw)
     name, start = STARTS[int(draw.between(0.0, len(STARTS)))]
     start(sketch)
-    sketch.note(name)
+    sketch.degeneracies.append(name)
     for degeneracy, part, add in DEGENERACIES:
         if draw.chance(part):
             add(sketch)
-            sketch.note(degeneracy)
+            sketch.degeneracies.append(degeneracy)
     sections = _sections(sketch)
     period, ticks = _time(sketch)
     sections["time"] = {"duration_s": period * ticks / 1e9, "control_period_s": period / 1e9}
@@ -139,7 +139,7 @@ def _time(sketch: Sketch) -> tuple[int, int]:
     swing = max(math.sqrt(sum(sketch.springs[k]) / sketch.mass[2 * k]) for k in (0, 1))
     impact = max(_contact_rate(sketch, k) for k in (0, 1)) or sketch.speed / sketch.size
     if draw.chance(0.06):
-        sketch.note("any horizon")
+        sketch.degeneracies.append("any horizon")
         seconds = draw.decades(-9.0, 4.0)
     else:
         rates = (impact, swing or impact, sketch.speed / sketch.size, impact)
@@ -154,7 +154,7 @@ def _add_loop(sketch: Sketch, sections: Sections) -> None:
     draw = sketch.draw
     if not draw.chance(0.2):
         return
-    sketch.note("loop")
+    sketch.degeneracies.append("loop")
     sections["loop"] = {"delay_ticks": int(draw.between(0.0, 4.0))} if draw.chance(0.3) else {}
 
 
@@ -166,26 +166,26 @@ def _add_forces(sketch: Sketch, sections: Sections, period: int, ticks: int) -> 
     force = min(usual * draw.decades(-3.0, 2.0), 1e12) * (1.0 if draw.chance(0.5) else -1.0)
     start, length = int(draw.between(0.0, ticks)), 1 + int(draw.between(0.0, ticks))
     if draw.chance(0.12):
-        sketch.note("pulse")
+        sketch.degeneracies.append("pulse")
         sections[f"{body}_pulse"] = {"force_N": force, "start_s": start * period / 1e9,
                                      "length_s": length * period / 1e9}
     if draw.chance(0.06):
-        sketch.note("table")
+        sketch.degeneracies.append("table")
         times = [tick for tick in (start, start + length, start + 2 * length) if tick <= ticks]
         sections[f"{body}_table"] = {"time_s": [tick * period / 1e9 for tick in times],
                                      "force_N": [force * draw.between(-1.0, 1.0) for _ in times]}
     if draw.chance(0.03):
-        sketch.note("sine")
+        sketch.degeneracies.append("sine")
         sections[f"{body}_sine"] = {"amplitude_N": abs(force), "frequency_Hz": min(0.1e9 / period, 1e6)}
 
 
 def _leave_out(sketch: Sketch, sections: Sections) -> None:
     draw = sketch.draw
     if draw.chance(0.06):
-        sketch.note("absent")
+        sketch.degeneracies.append("absent")
         side = SIDES[int(draw.between(0.0, 2.0))]
         for section in [section for section in sections if section.startswith(f"{side}_")]:
             del sections[section]
     elif draw.chance(0.03):
-        sketch.note("no contact")
+        sketch.degeneracies.append("no contact")
         del sections[f"{SIDES[int(draw.between(0.0, 2.0))]}_contact"]

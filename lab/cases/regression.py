@@ -152,10 +152,6 @@ def verdict(scene: Scene, right: Answer) -> Verdict:
     The error is relative to what one rounding explains: one of the state, and one of each number of the scene,
     amplified by the motion. So it is |x - right| / (EPS size (1 + amplification)), the largest over bodies, positions
     and velocities, and times, relative to `_size`.
-
-    Returns
-    -------
-    Verdict
     """
     try:
         run = simulate(scene, grid=np.array([*right.t, scene.duration]), sampled=scene.sampled)

@@ -150,10 +150,6 @@ def run(seed: int, directory: Path, *, seconds: float | None = None, draws: int 
     memory : Kept, optional
         What it knows is not drawn again.
 
-    Returns
-    -------
-    Book
-
     Raises
     ------
     Refused

@@ -46,18 +46,7 @@ class Wrong(Exception):  # noqa: N818 - a finding
 
 
 class Plant:
-    """A plant that is steered, and what is known of it: where it stands, and the ticks that its bag must have.
-
-    Parameters
-    ----------
-    graph : Graph
-        Begins paused.
-
-    Attributes
-    ----------
-    lengths : list of int
-        States of the runs that a reset has ended.
-    """
+    """A plant that begins paused, and what is known of it: where it stands, and the ticks that its bag must have."""
 
     def __init__(self, graph: Graph) -> None:
         self._context = rclpy.Context()
@@ -71,7 +60,7 @@ class Plant:
             if not client.wait_for_service(ANSWER_SECONDS):
                 raise Wrong(f"{client.srv_name}: nobody offers this service")
         self.ticks = graph.scene.ticks
-        self.lengths: list[int] = []
+        self.lengths: list[int] = []  # states of the runs that a reset has ended
         self.paused, self.tick, self.resets = True, 0, 0
         self.settle()
 
@@ -215,15 +204,7 @@ def _step(plant: Plant, action: str, draw: random.Random) -> bool:
 
 @contextmanager
 def steered(scene: Scene, directory: Path) -> Iterator[Plant]:
-    """A graph of real processes, paused at its first state; ends it.
-
-    Parameters
-    ----------
-    scene : Scene
-        Goes on long enough.
-    directory : Path
-        New directory.
-    """
+    """A graph of real processes in a new directory, paused at its first state; ends it."""
     graph = Graph(scene, directory, ACCURACY, errors=subprocess.DEVNULL, plant={"paused": "true"})
     graph.start()
     try:

@@ -23,7 +23,7 @@ from lab.oracles.motion import ledgers
 from lab.oracles.replay import findings
 from lab.oracles.restart_check import digits, reversal, splitting
 from lab.oracles.rounding_bounds import DIED_OUT
-from lab.oracles.segments import Detail, Pieces, cut, detail, grid_of, pieces_of, rule
+from lab.oracles.segments import Detail, Pieces, cut, detail, grid_of, pieces_of
 from lab.reference.grasp import commands
 
 MOST_EVENTS = 2000
@@ -169,10 +169,9 @@ def _smallest(run: Trajectory) -> float:
 
 def look(run: Trajectory, pieces: Pieces, product: Product) -> Detail:
     """The same run with outputs at the nodes of its pieces."""
-    table = rule()
-    grid = grid_of(pieces, table)
+    grid = grid_of(pieces)
     again = product.run(run.scene, np.append(grid.ravel(), run.scene.duration))
-    return detail(again, pieces, table, grid)
+    return detail(again, pieces, grid)
 
 
 def _held(run: Trajectory) -> float:

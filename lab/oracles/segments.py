@@ -156,15 +156,15 @@ def _changes(scene: Scene) -> Array:
     return np.array(sorted(ticks)) * scene.period_ns / NANOSECONDS
 
 
-def grid_of(pieces: Pieces, table: Rule) -> Array:
+def grid_of(pieces: Pieces) -> Array:
     """Times (k, n + 2) of the ends and the nodes of all pieces."""
     length = pieces.end - pieces.begin
-    inner = pieces.begin[:, None] + length[:, None] * table.nodes[pieces.kind]
+    inner = pieces.begin[:, None] + length[:, None] * rule().nodes[pieces.kind]
     grid = np.column_stack([pieces.begin, inner, pieces.end])
     return np.minimum(np.maximum.accumulate(grid, axis=1), pieces.end[:, None])
 
 
-def detail(run: Trajectory, pieces: Pieces, table: Rule, grid: Array) -> Detail:
+def detail(run: Trajectory, pieces: Pieces, grid: Array) -> Detail:
     """The states of a run whose output times are those of `grid_of`, and after them any others."""
     states = np.nan_to_num(run.state[: grid.size]).reshape(*grid.shape, 6)
     system = run.scene.system
@@ -176,5 +176,5 @@ def detail(run: Trajectory, pieces: Pieces, table: Rule, grid: Array) -> Detail:
         ticks = tick_of(run.scene, 0.5 * (pieces.begin + pieces.end)).tolist()
         acting[..., Of.FORCE] += np.array([system.external_at(tick) for tick in ticks]).reshape(-1, 3)
     places = np.array(PLACES)
-    weights = np.array([table.weights, *table.coarse])[:, pieces.kind] * (pieces.end - pieces.begin)[:, None]
+    weights = np.array([rule().weights, *rule().coarse])[:, pieces.kind] * (pieces.end - pieces.begin)[:, None]
     return Detail(run, pieces, weights, grid, states[..., places], states[..., places + 1], acting)

@@ -39,9 +39,8 @@ class Run(Automaton):
 
     Parameters
     ----------
-    plant : Plant
-    x, v : lists (3,) of mpfr, m and m/s
-        By body, at t = 0.
+    plant, x, v
+        See `Motion`.
     outputs : list of mpfr, s
         Ascending times.
     digits : int

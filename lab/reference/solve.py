@@ -57,8 +57,8 @@ def integrate(scene: Scene, times: Iterable[Real], digits: int = 25, budget: flo
               state: Sequence[Real] | None = None, decimal: bool = False) -> Reference:
     """The motion of a scene in high precision.
 
-    The floats of the system that the scene makes are taken exactly; forces act from tick to tick, and commands are
-    computed by the controllers from the states of this motion.
+    The floats of the system that the scene makes are taken exactly, a continuous feedback added to them; forces act
+    from tick to tick, and commands are computed by the controllers from the states of this motion.
 
     Parameters
     ----------
@@ -74,10 +74,6 @@ def integrate(scene: Scene, times: Iterable[Real], digits: int = 25, budget: flo
         touch.
     decimal : bool
         A float stands for its shortest decimal form, 0.2 for one fifth, rather than for its binary value.
-
-    Returns
-    -------
-    Reference
 
     Raises
     ------
@@ -115,9 +111,12 @@ def _ticks(scene: Scene) -> list[int]:
 
 
 def _plant(scene: Scene, exact: Callable[[float], Real]) -> Plant:
-    """What a scene simulates; the continuous feedback is in it."""
+    """What a scene simulates; the continuous feedback is in it, added here and not by the product."""
     system = scene.system
-    rows = (system.bodies if scene.sampled else system.closed_loop).tolist()
+    rows = system.bodies.tolist()
+    for side, law in () if scene.sampled else system.laws.items():
+        kp, kv, set_point, feed_forward, *_ = law.row.tolist()
+        rows[side] = np.add(rows[side], [0.0, kp, kv, kp * set_point + feed_forward]).tolist()
     left, right, thing = (Body.of(*map(exact, row)) if row[0] else None for row in rows)
     pairs = system.pairs.tolist()
     laws = [Law(*map(exact, pairs[side])) if side in system.contacts else None for side in (LEFT, RIGHT)]

@@ -22,14 +22,7 @@ MEGABYTE = 2**20
 
 
 def run(name: str, ticks: int) -> bool:
-    """Print what a run of many ticks took; returns whether nothing was lost and memory was flat.
-
-    Parameters
-    ----------
-    name : str
-        Of a scene.
-    ticks : int
-    """
+    """Print what many ticks of a scene took; returns whether nothing was lost and memory was flat."""
     scene = scenes.load(name, [f"time.duration_s={ticks * scenes.load(name).period_ns / NANOSECONDS!r}"])
     companion = Companion()
     with tempfile.TemporaryDirectory() as directory:

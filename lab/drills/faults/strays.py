@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -91,11 +92,12 @@ def _go_wrong(stage: Stage, **fields: Any) -> None:
 
 
 def _others() -> list[Drill]:
+    other = ("-p", "left_feedback.position_gain_N_per_m:=9.0", "-r", "__node:=other")
     return [
         Drill("second-controller", OTHERS, "a second left controller, with another gain", Stage.run,
-              partial(_second, words=["-r", "__node:=other"],
-                      numbers={"left_feedback.position_gain_N_per_m": "9.0"})),
-        Drill("second-plant", OTHERS, "a second plant", Stage.run, partial(_second, name="plant"), by_itself=True),
+              partial(_second, name="left_controller", topic=LEFT_COMMAND, words=other)),
+        Drill("second-plant", OTHERS, "a second plant", Stage.run, partial(_second, name="plant", topic=JOINT_STATES),
+              by_itself=True),
         Drill("second-run", OTHERS, "a second `grasp run`", Stage.run, _second_run, by_itself=True),
         Drill("frozen-reader", OTHERS, "a subscriber that is frozen", _with_reader, _freeze_reader),
         Drill("other-scene", OTHERS, "the plant is killed, and one with another scene is started", Stage.terminals,
@@ -103,22 +105,16 @@ def _others() -> list[Drill]:
     ]
 
 
-def _second(stage: Stage, name: str = "left_controller", words: Any = (), numbers: Any = None) -> None:
-    numbers = numbers or {}
-    options = [word for key, value in numbers.items() for word in ("-p", f"{key}:={value}")]
-    stage.start(f"second {name}", [*NODE, name, "--ros-args", *options, *words])
-    _when_there(stage, LEFT_COMMAND if name == "left_controller" else JOINT_STATES)
+def _second(stage: Stage, name: str, topic: Topic, words: Sequence[str] = ()) -> None:
+    """The accident happens when its topic has two sources."""
+    stage.start(f"second {name}", [*NODE, name, "--ros-args", *words])
+    stage.happens(stage.companion.ask("wait_for_sources", topic=topic.name, number=2)["when"])
 
 
 def _second_run(stage: Stage) -> None:
     stage.start("second run", stage.run_words(place="second"))
     stage.wait(lambda: stage.ended("second run"), 20.0)
     stage.happens()
-
-
-def _when_there(stage: Stage, topic: Topic) -> None:
-    """The accident happens when a topic has two sources."""
-    stage.happens(stage.companion.ask("wait_for_sources", topic=topic.name, number=2)["when"])
 
 
 def _with_reader(stage: Stage) -> None:

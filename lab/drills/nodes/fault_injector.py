@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import json
 import math
-import queue
+import select
 import sys
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -160,17 +159,12 @@ def filled(message: Any, fields: dict[str, Any]) -> Any:
 
 def main() -> None:
     """Do what the lines say until there are no more."""
-    lines: queue.Queue[str] = queue.Queue()
-    threading.Thread(target=_read, args=(lines,), daemon=True).start()
     stranger: Stranger | None = None
     while True:
-        try:
-            line = lines.get(timeout=0.0 if stranger else None)
-        except queue.Empty:
-            assert stranger is not None
+        if stranger is not None and not select.select([sys.stdin], [], [], 0.0)[0]:
             stranger.spin()
             continue
-        if not line:
+        if not (line := sys.stdin.readline()):  # nobody asks again before the answer, so that none waits in its buffer
             break
         words = json.loads(line)
         action, answer = words.pop("do"), {}
@@ -184,12 +178,6 @@ def main() -> None:
         print(json.dumps(answer), flush=True)
     if stranger is not None:
         stranger.close()
-
-
-def _read(lines: queue.Queue[str]) -> None:
-    for line in sys.stdin:
-        lines.put(line)
-    lines.put("")
 
 
 if __name__ == "__main__":
