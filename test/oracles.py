@@ -19,7 +19,7 @@ from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Arm, Array, Contact
 from lab.oracles.closed_forms import Balance, Impact, balance, first_touch_from_rest, flight, impact, reduced_mass
 from lab.reference import Reference, integrate
-from lab.reference.grasp import Grasp, grasp_of, system_of
+from lab.reference.grasp import Grasp, system_of
 
 __all__ = ["Balance", "Impact", "first_touch_from_rest", "flight", "impact", "reduced_mass"]  # for the tests
 STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)
@@ -62,9 +62,7 @@ def flight_array(body: Sequence[float], x: float, v: float, t: Array) -> tuple[A
 @cache
 def reference_of(name: str, horizon: float, points: int = 201) -> Reference:
     """The reference of a scene's binary floats on an equidistant grid; with 25 digits the doubles are the same."""
-    scene = scenes.load(name)
-    times = np.linspace(0.0, horizon, points).tolist()
-    return integrate(grasp_of(scene), scene.initial_state.tolist(), times, digits=16)
+    return integrate(scenes.load(name), np.linspace(0.0, horizon, points).tolist(), digits=16)
 
 
 # Balances of momentum and energy, O3.

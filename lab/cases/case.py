@@ -33,21 +33,12 @@ class Solver(Protocol):
 
 @dataclass
 class Product:
-    """The simulation of this package.
-
-    Attributes
-    ----------
-    max_events, max_work : int
-    accuracy : float
-        See `exact.Integrator`.
-    runs : list of Trajectory
-        All runs so far; what was reached is in them even if a run was stopped.
-    """
+    """The simulation of this package."""
 
     max_events: int = MAX_EVENTS
     max_work: int = MAX_WORK
-    accuracy: float = ACCURACY
-    runs: list[Trajectory] = field(default_factory=list)
+    accuracy: float = ACCURACY  # see `exact.Integrator`
+    runs: list[Trajectory] = field(default_factory=list)  # all so far; a run that was stopped is there as far as it got
 
     def run(self, scene: Scene, times: Iterable[float] | None = None, sampled: bool = False) -> Trajectory:
         """Simulate a scene to its end.
@@ -83,35 +74,16 @@ def recorded(solver: Solver) -> list[Event] | None:
 
 @dataclass(frozen=True)
 class Case:
-    """A hard case.
+    """A hard case."""
 
-    Attributes
-    ----------
-    family : Family
-        Why it is hard, and what decides.
-    name : str
-    error : callable
-        Runs the case with a solver and returns its error by the oracle, >= 0.
-    bound : float
-        What the product promises for the error.
-    note : str
-        Where the reason or the oracle differs from the family's.
-    limit : Status
-        A status with which the product may end instead; DONE: none.
-    product_only : bool
-        Whether the error needs more than states and events, which other solvers do not have.
-    max_events, max_work : int
-        Budgets of contact events and of work.
-    """
-
-    family: Family
+    family: Family  # why it is hard, and what decides
     name: str
-    error: Callable[..., float]  # of a Solver, or of the Product
-    bound: float
-    note: str = ""
-    limit: Status = Status.DONE
-    product_only: bool = False
-    max_events: int = MAX_EVENTS
+    error: Callable[..., float]  # runs it with a Solver, or the Product, and returns its error by the oracle, >= 0
+    bound: float  # what the product promises for the error
+    note: str = ""  # where the reason or the oracle differs from the family's
+    limit: Status = Status.DONE  # a status with which the product may end instead; DONE: none
+    product_only: bool = False  # the error needs more than states and events, which other solvers do not have
+    max_events: int = MAX_EVENTS  # budget of contact events
     max_work: int = MAX_WORK
 
     @property

@@ -9,9 +9,11 @@ import math
 from collections.abc import Callable
 
 from grasp_ros import scene as scenes
+from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene
 from lab.cases.degenerate_starts import SIDES, STARTS, Sections, Sketch, ulps
 from lab.cases.draw import Draw, draw_ordinary
+from lab.cases.scenes import side_sections
 
 ORDINARY = 0.15  # part of all draws
 
@@ -92,11 +94,11 @@ def draw_degenerate(draw: Draw) -> Scene:
     sketch = Sketch(draw)
     name, start = STARTS[int(draw.between(0.0, len(STARTS)))]
     start(sketch)
-    sketch.note(name)
+    sketch.degeneracies.append(name)
     for degeneracy, part, add in DEGENERACIES:
         if draw.chance(part):
             add(sketch)
-            sketch.note(degeneracy)
+            sketch.degeneracies.append(degeneracy)
     sections = _sections(sketch)
     period, ticks = _time(sketch)
     sections["time"] = {"duration_s": period * ticks / 1e9, "control_period_s": period / 1e9}
@@ -112,13 +114,10 @@ def _sections(sketch: Sketch) -> Sections:
     for k, side in enumerate(SIDES):
         (spring, gain), (damper, rate) = ([min(number, 1e12) for number in numbers[k]]
                                           for numbers in (sketch.springs, sketch.dampers))
-        sections[f"{side}_arm"] = {
-            "mass_kg": sketch.mass[2 * k], "stiffness_N_per_m": spring, "damping_Ns_per_m": damper,
-            "position_m": sketch.x[2 * k], "velocity_m_per_s": sketch.v[2 * k],
-        }
-        targets = {key: min(max(value, -1e12), 1e12) for key, value in sketch.targets[k].items()}
-        sections[f"{side}_feedback"] = {"position_gain_N_per_m": gain, "velocity_gain_Ns_per_m": rate, **targets}
-        sections[f"{side}_contact"] = {"hertz_N_per_m1_5": sketch.hertz[k], "dissipation_s_per_m": sketch.loss[k]}
+        arm, contact = Arm(sketch.mass[2 * k], spring, damper, gain, rate), Contact(sketch.hertz[k], sketch.loss[k])
+        sections |= side_sections(side, arm, contact, sketch.x[2 * k], sketch.v[2 * k])
+        for key, value in sketch.targets[k].items():
+            sections[f"{side}_feedback"][key] = min(max(value, -1e12), 1e12)
     return sections
 
 
@@ -140,7 +139,7 @@ def _time(sketch: Sketch) -> tuple[int, int]:
     swing = max(math.sqrt(sum(sketch.springs[k]) / sketch.mass[2 * k]) for k in (0, 1))
     impact = max(_contact_rate(sketch, k) for k in (0, 1)) or sketch.speed / sketch.size
     if draw.chance(0.06):
-        sketch.note("any horizon")
+        sketch.degeneracies.append("any horizon")
         seconds = draw.decades(-9.0, 4.0)
     else:
         rates = (impact, swing or impact, sketch.speed / sketch.size, impact)
@@ -155,7 +154,7 @@ def _add_loop(sketch: Sketch, sections: Sections) -> None:
     draw = sketch.draw
     if not draw.chance(0.2):
         return
-    sketch.note("loop")
+    sketch.degeneracies.append("loop")
     sections["loop"] = {"delay_ticks": int(draw.between(0.0, 4.0))} if draw.chance(0.3) else {}
 
 
@@ -167,26 +166,26 @@ def _add_forces(sketch: Sketch, sections: Sections, period: int, ticks: int) -> 
     force = min(usual * draw.decades(-3.0, 2.0), 1e12) * (1.0 if draw.chance(0.5) else -1.0)
     start, length = int(draw.between(0.0, ticks)), 1 + int(draw.between(0.0, ticks))
     if draw.chance(0.12):
-        sketch.note("pulse")
+        sketch.degeneracies.append("pulse")
         sections[f"{body}_pulse"] = {"force_N": force, "start_s": start * period / 1e9,
                                      "length_s": length * period / 1e9}
     if draw.chance(0.06):
-        sketch.note("table")
+        sketch.degeneracies.append("table")
         times = [tick for tick in (start, start + length, start + 2 * length) if tick <= ticks]
         sections[f"{body}_table"] = {"time_s": [tick * period / 1e9 for tick in times],
                                      "force_N": [force * draw.between(-1.0, 1.0) for _ in times]}
     if draw.chance(0.03):
-        sketch.note("sine")
+        sketch.degeneracies.append("sine")
         sections[f"{body}_sine"] = {"amplitude_N": abs(force), "frequency_Hz": min(0.1e9 / period, 1e6)}
 
 
 def _leave_out(sketch: Sketch, sections: Sections) -> None:
     draw = sketch.draw
     if draw.chance(0.06):
-        sketch.note("absent")
+        sketch.degeneracies.append("absent")
         side = SIDES[int(draw.between(0.0, 2.0))]
         for section in [section for section in sections if section.startswith(f"{side}_")]:
             del sections[section]
     elif draw.chance(0.03):
-        sketch.note("no contact")
+        sketch.degeneracies.append("no contact")
         del sections[f"{SIDES[int(draw.between(0.0, 2.0))]}_contact"]

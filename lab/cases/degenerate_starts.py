@@ -40,10 +40,6 @@ class Sketch:
         """A speed of the scene's size, or none."""
         return 0.0 if self.draw.chance(0.3) else self.speed * self.draw.between(-1.0, 1.0)
 
-    def note(self, degeneracy: str) -> None:
-        """Name a degeneracy."""
-        self.degeneracies.append(degeneracy)
-
 
 def ulps(draw: Draw, value: float) -> float:
     """The value, or one a few roundings beside it; 0 stays 0, beside which numbers are denormal."""

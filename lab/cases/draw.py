@@ -13,8 +13,9 @@ import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros.maps.plan import Axis
+from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene, SceneError
-from lab.cases.scenes import horizon
+from lab.cases.scenes import horizon, side_sections
 
 NUMBERS = 160  # of a draw
 
@@ -58,14 +59,9 @@ def draw_ordinary(draw: Draw) -> Scene:
         stiffness, gain = (mass * draw.decades(-4.0, 6.0, zero=0.15) for _ in range(2))
         damping, velocity = (mass * draw.decades(-6.0, 4.0, zero=0.2) for _ in range(2))
         place = 0.0 if draw.chance(0.1) else sign * size * draw.between(-0.02, 1.0)
-        sections[f"{side}_arm"] = {
-            "mass_kg": mass, "stiffness_N_per_m": stiffness, "damping_Ns_per_m": damping, "position_m": place,
-            "velocity_m_per_s": speed * draw.between(-1.0, 1.0),
-        }
-        sections[f"{side}_feedback"] = {"position_gain_N_per_m": gain, "velocity_gain_Ns_per_m": velocity}
-        sections[f"{side}_contact"] = {
-            "hertz_N_per_m1_5": draw.decades(0.0, 10.0), "dissipation_s_per_m": draw.decades(-4.0, 3.0, zero=0.2),
-        }
+        rate = speed * draw.between(-1.0, 1.0)
+        contact = Contact(draw.decades(0.0, 10.0), draw.decades(-4.0, 3.0, zero=0.2))
+        sections |= side_sections(side, Arm(mass, stiffness, damping, gain, velocity), contact, place, rate)
         slowest = max(slowest, math.sqrt((stiffness + gain) / mass))
     sections["object"] = {
         "mass_kg": draw.decades(-5.0, 5.0), "position_m": 0.0, "velocity_m_per_s": speed * draw.between(-1.0, 1.0),

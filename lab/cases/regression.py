@@ -26,7 +26,7 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene, SceneError
 from grasp_ros.simulation import simulate
 from lab.oracles.rounding_bounds import largest, rates
-from lab.reference import integrate_scene
+from lab.reference import integrate
 
 SCENES = Path(__file__).with_name("regression")
 ANSWERS = SCENES / "answers.json"
@@ -83,9 +83,9 @@ def answer(scene: Scene) -> Answer:
     """
     halves = {scene.duration / 2**k for k in range(HALVINGS + 1)}
     times = sorted(halves | {scene.duration * k / PARTS for k in range(1, PARTS)})
-    right = integrate_scene(scene, times, DIGITS, budget=STEPS)
+    right = integrate(scene, times, DIGITS, budget=STEPS)
     small = [row for row in right.state if max(map(abs, row)) < LARGE]
-    drawn = [integrate_scene(moved, times[: len(small)], DRAWN_DIGITS, budget=STEPS).state for moved in _moved(scene)]
+    drawn = [integrate(moved, times[: len(small)], DRAWN_DIGITS, budget=STEPS).state for moved in _moved(scene)]
     amplification = []
     for row, *changed in zip(small, *drawn, strict=False):
         changes = np.array([[float(a - b) for a, b in zip(draw, row, strict=True)] for draw in changed])
@@ -152,10 +152,6 @@ def verdict(scene: Scene, right: Answer) -> Verdict:
     The error is relative to what one rounding explains: one of the state, and one of each number of the scene,
     amplified by the motion. So it is |x - right| / (EPS size (1 + amplification)), the largest over bodies, positions
     and velocities, and times, relative to `_size`.
-
-    Returns
-    -------
-    Verdict
     """
     try:
         run = simulate(scene, grid=np.array([*right.t, scene.duration]), sampled=scene.sampled)

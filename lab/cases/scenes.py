@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,6 @@ from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Arm, Array, Contact
 from grasp_ros.scene import Scene
 from lab.reference import Reference, integrate
-from lab.reference.grasp import Grasp, grasp_of
 
 STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)
 ELASTIC = Arm(1.0, 10.0, 0.0, 5.0, 0.0)
@@ -40,20 +40,25 @@ def grasp(state: Sequence[float] | Array, seconds: float, *, left: Arm = STANDAR
     """A scene of the paper's kind, with any numbers; both sides are equal unless told otherwise."""
     x_l, v_l, x_o, v_o, x_r, v_r = (float(value) for value in state)
     arms = {"left": (left, contact, x_l, v_l), "right": (right or left, right_contact or contact, x_r, v_r)}
-    sections: dict[str, dict[str, float]] = {
+    sections: dict[str, dict[str, Any]] = {
         "time": horizon(seconds),
         "object": {"mass_kg": mass, "position_m": x_o, "velocity_m_per_s": v_o},
     }
-    for side, (arm, pair, x, v) in arms.items():
-        sections[f"{side}_arm"] = {
+    for side, given in arms.items():
+        sections |= side_sections(side, *given)
+    return scenes.compose(name, sections)
+
+
+def side_sections(side: str, arm: Arm, contact: Contact, x: float, v: float) -> dict[str, dict[str, Any]]:
+    """The sections of an arm, its feedback and its contact."""
+    return {
+        f"{side}_arm": {
             "mass_kg": arm.mass, "stiffness_N_per_m": arm.stiffness, "damping_Ns_per_m": arm.damping,
             "position_m": x, "velocity_m_per_s": v,
-        }
-        sections[f"{side}_feedback"] = {
-            "position_gain_N_per_m": arm.position_gain, "velocity_gain_Ns_per_m": arm.velocity_gain,
-        }
-        sections[f"{side}_contact"] = {"hertz_N_per_m1_5": pair.hertzian, "dissipation_s_per_m": pair.dissipation}
-    return scenes.compose(name, sections)
+        },
+        f"{side}_feedback": {"position_gain_N_per_m": arm.position_gain, "velocity_gain_Ns_per_m": arm.velocity_gain},
+        f"{side}_contact": {"hertz_N_per_m1_5": contact.hertzian, "dissipation_s_per_m": contact.dissipation},
+    }
 
 
 def library(name: str, seconds: float) -> Scene:
@@ -62,22 +67,18 @@ def library(name: str, seconds: float) -> Scene:
 
 
 @lru_cache(maxsize=256)
-def _reference(paper: Grasp, start: tuple[float, ...], times: tuple[float, ...], force: tuple[float, float],
-               feedback: bool) -> Reference:
-    return integrate(paper, start, times, digits=25, force=force, feedback=feedback)
+def _reference(text: str, times: tuple[float, ...]) -> Reference:
+    return integrate(scenes.parse(text, "case", "a hard case"), times)
 
 
-def reference_run(scene: Scene, times: Sequence[float] | Array, force: tuple[float, float] = (0.0, 0.0),
-                  feedback: bool = True) -> Reference:
+def reference_run(scene: Scene, times: Sequence[float] | Array) -> Reference:
     """States and contacts by another method with 25 digits."""
-    ticks = tuple(float(t) for t in times)
-    return _reference(grasp_of(scene), tuple(scene.initial_state.tolist()), ticks, force, feedback)
+    return _reference(scene.to_yaml(), tuple(float(t) for t in times))
 
 
-def reference(scene: Scene, times: Sequence[float] | Array, force: tuple[float, float] = (0.0, 0.0),
-              feedback: bool = True) -> Array:
+def reference(scene: Scene, times: Sequence[float] | Array) -> Array:
     """States (n, 6) of `reference_run`."""
-    return reference_run(scene, times, force, feedback).as_array()
+    return reference_run(scene, times).as_array()
 
 
 def contacts(events: Sequence[Event], side: int) -> tuple[Array, Array]:

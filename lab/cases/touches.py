@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from grasp_ros import scene as scenes
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Arm, Contact
 from lab.cases.case import Case, Product, Solver, recorded
@@ -60,8 +61,9 @@ def _within_one_period(product: Product) -> float:
     """Arm in and out of a light object within one control period of 0.8 s, with a command that is held."""
     scene = grasp([-0.3, 0.0, 0.1, 0.0, 30.0, 0.0], 0.8, left=Arm(1.0, 100.0, 0.2, 5.0, 0.5), right=FREE,
                   contact=Contact(1e4, 0.1), mass=1e-3)
-    expected = reference(scene, [0.0, scene.duration], force=(1.5, 0.0), feedback=False)
-    return distance(product.run(scene, [0.0, scene.duration], sampled=True).state[1:], expected[1:])
+    held = scenes.compose("held", {**scene.values, "loop": {}})
+    times = [0.0, scene.duration]
+    return distance(product.states(held, times)[1:], reference(held, times)[1:])
 
 
 def _during(seconds: float, right: Arm, mass: float, touches: int, solver: Solver) -> float:

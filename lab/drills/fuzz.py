@@ -13,7 +13,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from tqdm import tqdm
@@ -28,16 +28,11 @@ if TYPE_CHECKING:
     from lab.drills.random_scenes import Kept
 
 CHUNK = 50  # draws that a process does at once
+TABLES = {  # headers
+    "ends": ["scenes", "end"], "properties": ["property", "checked", "skipped", "failures", "worst", "draw"],
+    "degeneracies": ["degeneracy", "drawn", "failures"],
+}
 COMPARED = 5000  # every how many scenes one is compared with the reference
-
-
-class Drawn(NamedTuple):
-    """What became of one draw."""
-
-    number: int
-    degeneracies: str
-    found: Examination
-    yaml: str  # empty if all properties hold
 
 
 @dataclass
@@ -49,10 +44,6 @@ class Tally:
     failures: int = 0
     worst: float = 0.0
     where: int = 0  # number of the worst draw
-
-    def add(self, check: Check, number: int) -> None:
-        """Count a check."""
-        self.merge(Tally(1, check.skipped, int(not check.holds), check.error, number))
 
     def merge(self, other: Tally) -> None:
         """Count those of later draws, too."""
@@ -78,17 +69,6 @@ class Book:
         """Number of scenes that fail."""
         return len(self.scenes)
 
-    def add(self, drawn: Drawn) -> None:
-        """Count a draw."""
-        self.ends[drawn.found.end] += 1
-        names = drawn.degeneracies.split(", ")
-        self.degeneracies.update(names)
-        for check in drawn.found.checks:
-            self.tallies.setdefault(check.name, Tally()).add(check, drawn.number)
-        if drawn.found.broken:
-            self.scenes[drawn.number] = drawn.yaml
-            self.broken_degeneracies.update(names)
-
     def merge(self, other: Book) -> None:
         """Count later draws, too."""
         self.ends.update(other.ends)
@@ -98,22 +78,27 @@ class Book:
         for name, tally in other.tallies.items():
             self.tallies.setdefault(name, Tally()).merge(tally)
 
-    def by_failures(self) -> list[tuple[str, Tally]]:
-        """All properties, those that fail most often first."""
-        return sorted(self.tallies.items(), key=lambda item: (-item[1].failures, item[0]))
+    def tables(self) -> dict[str, list[list[str]]]:
+        """Rows, see TABLES: the largest numbers first, equal ones by their names."""
+        tallies = sorted(self.tallies.items(), key=lambda item: (-item[1].failures, item[0]))
+        return {
+            "ends": [[str(number), text] for text, number in _ordered(self.ends)],
+            "properties": [[name, str(tally.checked), str(tally.skipped), str(tally.failures), f"{tally.worst:.2g}",
+                            str(tally.where)] for name, tally in tallies],
+            "degeneracies": [[name, str(number), str(self.broken_degeneracies[name])]
+                             for name, number in _ordered(self.degeneracies)],
+        }
 
     def show(self) -> None:
         """Print all tables."""
-        for text, number in self.ends.most_common():
-            print(f"  {number:8}  {text}")
-        print(f"  {'checked':>8}  {'skipped':>8}  {'failures':>8}  {'worst':>8}  {'draw':>8}  property")
-        for name, tally in self.by_failures():
-            counts = f"{tally.checked:8}  {tally.skipped:8}  {tally.failures:8}"
-            print(f"  {counts}  {tally.worst:8.2g}  {tally.where:8}  {name}")
-        print(f"  {'drawn':>8}  {'failures':>8}  degeneracy")
-        for name, number in self.degeneracies.most_common():
-            print(f"  {number:8}  {self.broken_degeneracies[name]:8}  {name}")
+        for name, rows in self.tables().items():
+            for row in [TABLES[name], *rows]:
+                print(*(f"{cell:>8}" for cell in row), sep="  ")
         print(f"failures: {self.broken}")
+
+
+def _ordered(counts: Counter[str]) -> list[tuple[str, int]]:
+    return sorted(counts.items(), key=lambda item: (-item[1], item[0]))
 
 
 def draw(seed: int, number: int) -> Scene:
@@ -125,19 +110,26 @@ def check_draws(seed: int, numbers: Iterable[int]) -> Book:
     """Draw scenes and check them; an exception is a failure."""
     book = Book()
     for number in numbers:
-        book.add(_check(number, draw(seed, number)))
+        book.merge(_check(number, draw(seed, number)))
     return book
 
 
-def _check(number: int, scene: Scene) -> Drawn:
+def _check(number: int, scene: Scene) -> Book:
+    """What became of one draw."""
     try:
         found = examine(scene, every=False, compare=number % COMPARED == 0)
     except Exception:
         reason = traceback.format_exc().strip().splitlines()
         found = Examination("traceback", [Check(f"traceback: {reason[-1][:60]}", 1.0, 0.0)])
-    names = "; ".join(f"{check.name} {check.error:.2g}" for check in sorted(found.broken, key=lambda one: -one.error))
-    yaml = f"# {number}: {names}\n{scene.to_yaml()}" if found.broken else ""
-    return Drawn(number, scene.title, found, yaml)
+    book = Book(Counter([found.end]), degeneracies=Counter(scene.title.split(", ")))
+    for check in found.checks:
+        tally = Tally(1, check.skipped, int(not check.holds), check.error, number)
+        book.tallies.setdefault(check.name, Tally()).merge(tally)
+    if broken := sorted(found.broken, key=lambda check: -check.error):
+        names = "; ".join(f"{check.name} {check.error:.2g}" for check in broken)
+        book.scenes[number] = f"# {number}: {names}\n{scene.to_yaml()}"
+        book.broken_degeneracies = book.degeneracies.copy()
+    return book
 
 
 def run(seed: int, directory: Path, *, seconds: float | None = None, draws: int | None = None, first: int = 0,
@@ -157,10 +149,6 @@ def run(seed: int, directory: Path, *, seconds: float | None = None, draws: int 
         Processes.
     memory : Kept, optional
         What it knows is not drawn again.
-
-    Returns
-    -------
-    Book
 
     Raises
     ------

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple
 
 import numpy as np
 from ruamel.yaml import YAML
@@ -134,10 +134,6 @@ def _limited(more: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_AS, before)
 
 
-def _differs(what: str) -> NoReturn:
-    raise Broken(what)
-
-
 def _make_scene(library: list[str], rng: Random) -> bytes:
     text = library[int(rng.integers(len(library)))]
     match rng.integers(4):
@@ -159,17 +155,17 @@ def _read_scene(place: Path, content: bytes) -> None:
         for key, value in numbers.items():
             said = (other[section] or {})[key]
             if (tuple(said) if isinstance(said, list) else said) != value or isinstance(said, bool):
-                _differs(f"{section}.{key} is {said!r}, not {value!r}")
+                raise Broken(f"{section}.{key} is {said!r}, not {value!r}")
     for key in ("title", "watch"):
         said = other.get(key, "")
         if isinstance(said, str) and said != getattr(scene, key):  # 0x1F is a text for us, and a number for others
-            _differs(f"{key} is {said!r}")
+            raise Broken(f"{key} is {said!r}")
     if other.keys() != scene.values.keys() | {"title", "readings"} | ({"watch"} if "watch" in other else set()):
-        _differs("its sections are others")
+        raise Broken("its sections are others")
     if scenes.parse(scene.to_yaml(), scene.name, "again") != scene:
-        _differs("it changes when it is written")
+        raise Broken("it changes when it is written")
     if scene.warnings and "\n" in "".join(scene.warnings):
-        _differs("its warnings are no sentences")
+        raise Broken("its warnings are no sentences")
     simulate(scene, grid=np.linspace(0.0, scene.duration, 3), max_events=FEW_EVENTS, max_work=FEW_WORK)
 
 
@@ -185,7 +181,7 @@ def _read_result(right: Trajectory, place: Path, content: bytes) -> None:
     if found.scene != right.scene or any(
         getattr(found, name).tobytes() != getattr(right, name).tobytes() for name in ("t", "state", "event_table")
     ):
-        _differs("its scene or numbers are others")
+        raise Broken("its scene or numbers are others")
     found.energy, found.inputs, found.events  # noqa: B018 - can be computed
 
 
@@ -223,12 +219,12 @@ def _read_bag(right: Trajectory, whole: bytes, place: Path, content: bytes) -> N
         raise
     if kind == b"r":  # with checksums of its own
         if (np.diff(found.tick) <= 0).any() or found.tick[-1] > found.scene.ticks:
-            _differs("its ticks are none")
+            raise Broken("its ticks are none")
         return
     if kind == b"d" and storage != whole and found.lost["end"] == "closed":
-        _differs("bytes are others")
+        raise Broken("bytes are others")
     if found.state.tobytes() != right.state[: len(found.tick)].tobytes():
-        _differs("its states are others")
+        raise Broken("its states are others")
 
 
 def _recover(right: Trajectory, kind: bytes, path: Path, place: Path) -> None:
@@ -237,7 +233,7 @@ def _recover(right: Trajectory, kind: bytes, path: Path, place: Path) -> None:
         recover(path, Path(new) / "new")
         found = bag.read(Path(new) / "new")
     if kind != b"r" and found.state.tobytes() != right.state[found.tick].tobytes():
-        _differs("other states are recovered")
+        raise Broken("other states are recovered")
 
 
 def _entry(key: str) -> dict[str, object]:
@@ -263,4 +259,4 @@ def _read_journal(place: Path, content: bytes) -> None:
     if found is not None:
         found.missed, found.time, found.good  # noqa: B018 - can be computed
         if not isinstance(found.setting, (int, float)) or not isinstance(found.there_are, tuple):
-            _differs("its types are others")
+            raise Broken("its types are others")

@@ -20,11 +20,7 @@ ROOMS = "grasp_ros/scene", "grasp_ros/simulation", "lab/reference", "lab/cases",
 class Line(NamedTuple):
     """The book of a chunk of draws in the journal."""
 
-    ends: str  # JSON, as all of them
-    tallies: str
-    degeneracies: str
-    broken_degeneracies: str
-    scenes: str
+    book: str  # JSON
 
 
 class Kept:
@@ -49,15 +45,13 @@ class Kept:
         line = self._journal.get(self._key(numbers), Line)
         if line is None:
             return None
-        ends, tallies, degeneracies, broken, scenes = map(json.loads, line)
-        return Book(Counter(ends), {name: Tally(*tally) for name, tally in tallies.items()}, Counter(degeneracies),
+        ends, tallies, degeneracies, broken, scenes = json.loads(line.book).values()
+        return Book(Counter(ends), {name: Tally(**tally) for name, tally in tallies.items()}, Counter(degeneracies),
                     Counter(broken), {int(number): yaml for number, yaml in scenes.items()})
 
     def put(self, numbers: range, book: Book) -> None:
         """Keep what became of these draws."""
-        tallies = {name: list(vars(tally).values()) for name, tally in book.tallies.items()}
-        parts = (book.ends, tallies, book.degeneracies, book.broken_degeneracies, book.scenes)
-        self._journal.put(self._key(numbers), Line(*map(json.dumps, parts)))
+        self._journal.put(self._key(numbers), Line(json.dumps(vars(book), default=vars)))
 
 
 def write_page(docs: Path, seed: int, first: int, book: Book) -> None:
@@ -70,15 +64,4 @@ def write_page(docs: Path, seed: int, first: int, book: Book) -> None:
     """
     failures = [[f"`--seed {seed} --first {number} --draws 1`", yaml.splitlines()[0].split(": ", 1)[1]]
                 for number, yaml in sorted(book.scenes.items())]
-    properties = [[name, *map(str, (tally.checked, tally.skipped, tally.failures)), f"{tally.worst:.2g}",
-                   str(tally.where)] for name, tally in book.by_failures()]
-    degeneracies = [[name, str(number), str(book.broken_degeneracies[name])]
-                    for name, number in _ordered(book.degeneracies)]
-    ends = [[str(number), text] for text, number in _ordered(book.ends)]
-    pages.write(docs, "fuzz", seed=seed, first=first, draws=book.ends.total(), failures=failures, ends=ends,
-                properties=properties, degeneracies=degeneracies)
-
-
-def _ordered(counts: Counter[str]) -> list[tuple[str, int]]:
-    """The largest first; equal ones by their names."""
-    return sorted(counts.items(), key=lambda item: (-item[1], item[0]))
+    pages.write(docs, "fuzz", seed=seed, first=first, draws=book.ends.total(), failures=failures, **book.tables())

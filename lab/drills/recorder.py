@@ -7,7 +7,7 @@ import os
 import signal
 import tempfile
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -84,11 +84,10 @@ class Kill(NamedTuple):
         return self.read == self.recovered and self.lost <= PROMISED_SECONDS
 
 
-def kill(scene: Scene, ticks: Iterable[Tick], after: float) -> Kill:
+def kill(scene: Scene, ticks: list[Tick], after: float) -> Kill:
     """Record ticks in a process of its own, and kill it some seconds after the bag was opened."""
     with tempfile.TemporaryDirectory() as directory:
         path, noted = Path(directory) / "bag", Path(directory) / "times"
-        ticks = list(ticks)
         times: Array = np.lib.format.open_memmap(noted, "w+", float, (len(ticks),))
         child = multiprocessing.get_context("fork").Process(target=_record, args=(path, scene, ticks, times))
         child.start()

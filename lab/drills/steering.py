@@ -14,24 +14,30 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import rclpy
+from rcl_interfaces.srv import SetParameters
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
 from tqdm import tqdm
 
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.verify import laws_of, verify
+from grasp_ros.graph.host import LOCALHOST, RANGE
 from grasp_ros.graph.processes import Graph
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
-from lab.drills import nodes
 
 ACTIONS = ("pause", "resume", "step", "step", "step", "step too far", "step none", "reset", "step and at once")
+SERVICES = ("pause", "resume", "step", "reset", "status")
 MOST_STEPS = 40  # of a call, and ticks that a running plant is let go on
-SETTLE_SECONDS = 30.0
+SETTLE_SECONDS, ANSWER_SECONDS = 30.0, 60.0
 SECONDS = 1e5  # simulated, so that a running plant does not come to its end
 
 
@@ -40,64 +46,60 @@ class Wrong(Exception):  # noqa: N818 - a finding
 
 
 class Plant:
-    """A plant that is steered, and what is known of it: where it stands, and the ticks that its bag must have.
-
-    Parameters
-    ----------
-    graph : Graph
-        Begins paused.
-
-    Attributes
-    ----------
-    lengths : list of int
-        States of the runs that a reset has ended.
-    """
+    """A plant that begins paused, and what is known of it: where it stands, and the ticks that its bag must have."""
 
     def __init__(self, graph: Graph) -> None:
-        self._process = subprocess.Popen(
-            nodes.command("service_caller"),
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
-            env={**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, start_new_session=True,
-        )
-        self._graph = graph
-        self._read()
+        self._context = rclpy.Context()
+        rclpy.init(args=[], context=self._context)
+        self._node = rclpy.create_node("pilot", context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._clients = {name: self._node.create_client(Trigger, f"plant/{name}") for name in SERVICES}
+        self._set = self._node.create_client(SetParameters, "plant/set_parameters")
+        for client in (*self._clients.values(), self._set):
+            if not client.wait_for_service(ANSWER_SECONDS):
+                raise Wrong(f"{client.srv_name}: nobody offers this service")
         self.ticks = graph.scene.ticks
-        self.lengths: list[int] = []
+        self.lengths: list[int] = []  # states of the runs that a reset has ended
         self.paused, self.tick, self.resets = True, 0, 0
         self.settle()
 
     def close(self) -> None:
-        """End the process that calls."""
-        self._process.kill()
-        self._process.communicate()
+        """Leave the graph."""
+        self._executor.shutdown()
+        self._node.destroy_node()
+        self._context.shutdown()
 
-    def _read(self) -> tuple[bool, str]:
-        assert self._process.stdout is not None
-        for line in self._process.stdout:
-            if line.startswith("["):  # Fast DDS writes there, too
-                success, words = json.loads(line)
-                return success, words
-        raise Wrong("no service answers")
+    def call(self, service: str, steps: int | None = None) -> tuple[bool, str]:
+        """Call a service; returns whether it did something, and its words. `steps` is set before, where it may be."""
+        if steps is not None:
+            request = SetParameters.Request(parameters=[Parameter("steps", value=steps).to_parameter_msg()])
+            [result] = self._answer(self._set, request).results
+            if not result.successful:
+                return False, str(result.reason)
+        answer = self._answer(self._clients[service], Trigger.Request())
+        return bool(answer.success), str(answer.message)
 
-    def call(self, service: str, **words: Any) -> tuple[bool, str]:
-        """Call a service; returns whether it did something, and its words."""
-        assert self._process.stdin is not None
-        self._process.stdin.write(json.dumps({"service": service, **words}) + "\n")
-        self._process.stdin.flush()
-        return self._read()
+    def _answer(self, client: Any, request: Any) -> Any:
+        future = client.call_async(request)
+        self._executor.spin_until_future_complete(future, timeout_sec=ANSWER_SECONDS)
+        if not future.done():
+            raise Wrong(f"{client.srv_name}: no answer")
+        return future.result()
 
     def status(self) -> dict[str, Any]:
         """What the plant says of itself."""
         found: dict[str, Any] = json.loads(self.call("status")[1])
         return found
 
-    def expect(self, service: str, why: str = "", **words: Any) -> dict[str, Any]:
+    def expect(self, service: str, why: str = "", steps: int | None = None) -> dict[str, Any]:
         """Call a service that must succeed, or must not for some reason; returns its answer."""
-        done, said = self.call(service, **words)
+        done, said = self.call(service, steps)
         found: dict[str, Any] = json.loads(said) if said.startswith("{") else {"why": said}
         if done is bool(why) or why not in found.get("why", ""):
             expected = f"refused, {why!r}" if why else "done"
-            raise Wrong(f"{service} {words or ''}: {'done' if done else 'refused'}, {said!r}; expected: {expected}")
+            asked = service if steps is None else f"{service} {steps}"
+            raise Wrong(f"{asked}: {'done' if done else 'refused'}, {said!r}; expected: {expected}")
         return found
 
     def settle(self) -> None:
@@ -202,23 +204,12 @@ def _step(plant: Plant, action: str, draw: random.Random) -> bool:
 
 @contextmanager
 def steered(scene: Scene, directory: Path) -> Iterator[Plant]:
-    """A graph of real processes, paused at its first state; ends it.
-
-    Parameters
-    ----------
-    scene : Scene
-        Goes on long enough.
-    directory : Path
-        New directory.
-    """
+    """A graph of real processes in a new directory, paused at its first state; ends it."""
     graph = Graph(scene, directory, ACCURACY, errors=subprocess.DEVNULL, plant={"paused": "true"})
     graph.start()
     try:
-        plant = Plant(graph)
-        try:
+        with closing(Plant(graph)) as plant:
             yield plant
-        finally:
-            plant.close()
     finally:
         graph.stop()
 
@@ -257,6 +248,7 @@ def problems(path: Path, lengths: Sequence[int]) -> list[str]:
 def run(scene: Scene, calls: int, seed: int) -> bool:
     """Steer a graph at random, and print what came of it; returns whether all was as promised."""
     scene = scene.changed({"time.duration_s": SECONDS})
+    os.environ.setdefault(RANGE, LOCALHOST)  # before rclpy looks
     with tempfile.TemporaryDirectory() as directory:
         place = Path(directory) / "run"
         begin = time.monotonic()

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
+import gmpy2
 import numpy as np
 from mpmath import mp, mpf
 
@@ -17,6 +18,8 @@ from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import LEFT, RIGHT, Law, Of
 from grasp_ros.physics.model import Array, penetration
 from grasp_ros.physics.system import COLUMN, System
+from lab.reference.plant import Body, number
+from lab.reference.run import EXPONENTS, precision
 
 mp.dps = 40
 
@@ -159,25 +162,11 @@ def first_peak(x: float, mass: float, stiffness: float, damping: float) -> Any:
 
 
 def flight(body: Sequence[Any], x: Any, v: Any, t: Any) -> tuple[Any, Any]:
-    """Position and velocity after t, by the exponential of the matrix A of (x, v); body is (m, k, c, f).
-
-    A^2 = -c/m A - k/m, so that it is a + b A, and its integral p + q A: power series for a short time, doubled.
-    """
-    m, k, c, f = (mpf(value) for value in body)
-    doublings = max(0, mp.mag((1 + mp.sqrt(k / m) + abs(c / m)) * mpf(t))) + 8 if t else 0
-    with mp.workprec(mp.prec + 100 + 2 * doublings):
-        x, v, k, c, push, step = mpf(x), mpf(v), k / m, c / m, f / m, mpf(t) / 2**doublings
-        a, b, p, q = mpf(1), mpf(0), step, mpf(0)
-        first, second = a, b  # of (A t)^order / order!
-        for order in range(1, mp.prec // 8 + 3):
-            first, second = -k * second * step / order, (first - c * second) * step / order
-            a, b = a + first, b + second
-            p, q = p + first * step / (order + 1), q + second * step / (order + 1)
-        for _ in range(doublings):
-            p, q = p + a * p - k * b * q, q + a * q + b * (p - c * q)
-            a, b = a * a - k * b * b, b * (2 * a - c * b)
-        x, v = a * x + b * v + q * push, a * v - b * (k * x + c * v) + (p - c * q) * push
-    return +x, +v
+    """Position and velocity after t, by the closed form of `lab.reference`; body is (m, k, c, f)."""
+    with gmpy2.context(precision=precision(mp.dps), emax=EXPONENTS, emin=-EXPONENTS):
+        m, k, c, f, x, v, t = (number(mp.nstr(mpf(value), mp.dps + 20)) for value in (*body, x, v, t))
+        x, v = Body.of(m, k, c, f).drift(x, v, t)
+        return mpf(str(x)), mpf(str(v))
 
 
 def holding_force(stiffness: Sequence[Any], hertzian: Sequence[Any], overlap: Any) -> Any:

@@ -141,5 +141,5 @@ def _plateau(scene: Scene, key: str, size: float) -> _Plateau:
 
 def _end(scene: Scene) -> Array:
     """The last state (6,) of a run; NaN: it does not get there."""
-    run = simulate(scene, grid=np.array([scene.duration]), setting=FINEST)
+    run = _run(scene)
     return np.asarray(run.state[-1] if run.status is Status.DONE else np.full(6, np.nan))

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Entry
 from grasp_ros.physics.model import Arm, Array, Contact
 from grasp_ros.scene import Scene
-from lab.cases.case import Case, Product, Solver, recorded
+from lab.cases.case import Case, Product, Solver
 from lab.cases.families import RELATION
 from lab.cases.scenes import ELASTIC, distance, grasp, library, part
 
@@ -21,7 +21,7 @@ SWAPPED = [4, 5, 2, 3, 0, 1]
 FLIP = np.array([1.0, -1.0] * 3)  # backwards in time
 DIRECTED = ("position_m", "velocity_m_per_s", "set_point_m", "feed_forward_N", "force_N", "angle_rad")
 PAIRED = {"left": "right", "right": "left"}
-OTHER_SIDE = {LEFT: RIGHT, RIGHT: LEFT, OBJECT: OBJECT}
+OTHER_SIDE = np.array([RIGHT, LEFT, OBJECT], dtype=float)
 
 
 def mirrored(scene: Scene) -> Scene:
@@ -44,18 +44,14 @@ def scaled(scene: Scene, length: float, time: float, mass: float) -> Scene:
     """The scene in other units, O7; exact for powers of 4, 2 and 2."""
     force = mass * length / time**2
     factors = {
-        "mass_kg": mass, "stiffness_N_per_m": mass / time**2, "damping_Ns_per_m": mass / time,
-        "position_gain_N_per_m": mass / time**2, "velocity_gain_Ns_per_m": mass / time, "position_m": length,
-        "velocity_m_per_s": length / time, "hertz_N_per_m1_5": mass / (time**2 * math.sqrt(length)),
-        "dissipation_s_per_m": time / length, "duration_s": time, "control_period_s": time,
-        "set_point_m": length, "feed_forward_N": force, "force_N": force, "coulomb_N": force,
-        "viscous_Ns_per_m": mass / time, "start_s": time, "length_s": time, "angle_rad": 1.0,
-        "gravity_m_per_s2": length / time**2, "time_s": time, "amplitude_N": force, "frequency_Hz": 1.0 / time,
-        "phase_rad": 1.0, "limit_N": force, "position_noise_m": length, "velocity_noise_m_per_s": length / time,
-        "position_step_m": length, "velocity_step_m_per_s": length / time,
+        "kg": mass, "m": length, "s": time, "N": force, "Hz": 1.0 / time, "m/s": length / time,
+        "m/s^2": length / time**2, "N/m": mass / time**2, "N s/m": mass / time, "s/m": time / length,
+        "N/m^1.5": mass / (time**2 * math.sqrt(length)),
     }
+    units = {parameter.key: parameter.unit for effect in scene.effects for parameter in effect.parameters}
     return scenes.compose(scene.name, {
-        section: {key: _times(value, factors[key]) if key in factors else value for key, value in numbers.items()}
+        section: {key: _times(value, factors[units[key]]) if units[key] in factors else value
+                  for key, value in numbers.items()}
         for section, numbers in scene.values.items()
     })
 
@@ -69,24 +65,34 @@ def started(scene: Scene, state: Array) -> Scene:
 
 
 def mirror(scene: Scene, solver: Solver) -> float:
-    """Largest difference between a scene and its mirror image; the recorded events must be equal, too."""
+    """Largest difference between a scene and its mirror image; inf if the recorded events are others."""
     times = part(scene, 201)
-    here, own = solver.states(scene, times), recorded(solver)
-    there, image = solver.states(mirrored(scene), times), recorded(solver)
-    if own is not None and sorted(own) != sorted(event._replace(side=OTHER_SIDE[event.side]) for event in image or ()):
-        return np.inf
-    return float(np.abs(here + there[:, SWAPPED]).max())
+    here, own = _solved(scene, times, solver)
+    there, image = _solved(mirrored(scene), times, solver)
+    image[:, Entry.BODY] = OTHER_SIDE[image[:, Entry.BODY].astype(int)]
+    return _apart(here, -there[:, SWAPPED], own, image)
 
 
 def scaling(length: float, time: float, mass: float, scene: Scene, solver: Solver) -> float:
-    """Largest difference between a scene and itself in other units; the recorded events must be equal, too."""
+    """Largest difference between a scene and itself in other units; inf if the recorded events are others."""
     times = part(scene, 201)
-    here, own = solver.states(scene, times), recorded(solver)
-    there, image = solver.states(scaled(scene, length, time, mass), time * times), recorded(solver)
-    expected = [(time * event.time, event.side, event.kind) for event in own or ()]
-    if expected != [(event.time, event.side, event.kind) for event in image or ()]:
-        return np.inf
-    return float(np.abs(here * np.array([length, length / time] * 3) - there).max())
+    here, own = _solved(scene, times, solver)
+    there, image = _solved(scaled(scene, length, time, mass), time * times, solver)
+    moved = np.array([length, length / time])
+    return _apart(here * np.tile(moved, 3), there, own * np.array([time, 1.0, 1.0, *moved]), image)
+
+
+def _solved(scene: Scene, times: Array, solver: Solver) -> tuple[Array, Array]:
+    """States, 0 of what is not there, and the events that the product recorded; none of another solver."""
+    states = solver.states(scene, times).copy()
+    states[:, scene.system.absent_columns] = 0.0
+    return states, solver.runs[-1].event_table.copy() if isinstance(solver, Product) else np.zeros((0, len(Entry)))
+
+
+def _apart(here: Array, there: Array, own: Array, image: Array) -> float:
+    """Largest difference of states whose events are the same in any order: which side is looked at first is open."""
+    same = sorted(own.tolist()) == sorted(image.tolist())
+    return float(np.abs(here - there).max()) if same else np.inf
 
 
 def reversal(scene: Scene, solver: Solver) -> float:

@@ -47,11 +47,6 @@ class Ledger(NamedTuple):
     resolved: NDArray[np.bool_]  # (k,) where the quadrature resolves the motion
 
 
-def _total(detail: Detail, values: Array) -> Array:
-    """Integral of the size of values (k, n + 2, ...)."""
-    return detail.total(np.abs(values[:, 1:-1]))
-
-
 def _wander(detail: Detail, values: Array) -> Array:
     """What a rounding of the times changes in an integral of values (k, n + 2, ...)."""
     late = EPS * detail.pieces.end
@@ -61,8 +56,8 @@ def _wander(detail: Detail, values: Array) -> Array:
 
 def _resolved(detail: Detail, values: Array, noise: Array | float) -> NDArray[np.bool_]:
     """Whether all quadratures agree on values (k, n + 2, ...)."""
-    _, doubt = detail.integral(values[:, 1:-1])
-    return np.asarray(doubt <= SMOOTH * _total(detail, values) + noise)
+    _, doubt = detail.integral(values)
+    return np.asarray(doubt <= SMOOTH * detail.total(values) + noise)
 
 
 def ledgers(detail: Detail) -> Iterator[Ledger]:
@@ -82,7 +77,7 @@ def _ledgers(detail: Detail) -> Iterator[Ledger]:
     smooth &= ~_turns(detail)[:, None]
     pushed = np.ones(len(span), dtype=bool)
     for pair in pairs:
-        pushed &= _resolved(detail, pair.force, TINY + _total(detail, pair.by_u * pair.noise))
+        pushed &= _resolved(detail, pair.force, TINY + detail.total(pair.by_u * pair.noise))
     momentum, unit, held = _momentum(detail, size)
     friction = _friction(detail, pairs)
     everywhere = np.asarray(smooth[:, present].all(axis=1))
@@ -105,8 +100,8 @@ def _momentum(detail: Detail, size: Sizes) -> tuple[Array, Array, Array]:
     mass, stiffness, damping, force = np.moveaxis(detail.bodies, -1, 0)
     x, v = detail.x, detail.v
     span = (detail.pieces.end - detail.pieces.begin)[:, None]
-    place, doubt = detail.integral(x[:, 1:-1])
-    way, lag = detail.integral(v[:, 1:-1])
+    place, doubt = detail.integral(x)
+    way, lag = detail.integral(v)
     change = mass * (v[:, -1] - v[:, 0]) + damping * way + stiffness * place - force * span
     late = EPS * detail.pieces.end[:, None]
     acting = np.abs(stiffness)[:, None] * np.abs(x) + np.abs(damping)[:, None] * np.abs(v) + np.abs(force)[:, None]
@@ -115,7 +110,7 @@ def _momentum(detail: Detail, size: Sizes) -> tuple[Array, Array, Array]:
     unit = unit + EPS * (np.abs(stiffness) * size.x[:, 0] + np.abs(force)) * span
     unit = unit + late * acting[:, [0, -1]].max(axis=1) + np.abs(stiffness) * (doubt + _wander(detail, x))
     unit = unit + np.abs(damping) * (lag + _wander(detail, v))
-    held = np.abs(damping) * _total(detail, v) + np.abs(stiffness) * _total(detail, x) + np.abs(force) * span
+    held = np.abs(damping) * detail.total(v) + np.abs(stiffness) * detail.total(x) + np.abs(force) * span
     return change, unit + TINY, held
 
 
@@ -141,8 +136,7 @@ def _beyond(change: Array, friction: tuple[Array, Array], unit: Array) -> Array:
     low, high = friction
     outside = np.maximum(np.maximum(-change - high, low + change), 0.0)
     scale = unit + EPS * np.maximum(np.abs(low), np.abs(high))
-    found: Array = outside / scale
-    return found
+    return np.asarray(outside / scale)
 
 
 def _bodies(detail: Detail, pairs: list[Impacts], own: tuple[Array, Array, Array], friction: tuple[Array, Array],
@@ -153,8 +147,8 @@ def _bodies(detail: Detail, pairs: list[Impacts], own: tuple[Array, Array, Array
     """
     change, scale, held = (part.copy() for part in own)
     for pair in pairs:
-        impulse, doubt = detail.integral(pair.force[:, 1:-1])
-        noise = _total(detail, pair.by_u) * pair.noise[:, 0] + _total(detail, pair.by_d) * pair.noise_d[:, 0]
+        impulse, doubt = detail.integral(pair.force)
+        noise = detail.total(pair.by_u) * pair.noise[:, 0] + detail.total(pair.by_d) * pair.noise_d[:, 0]
         noise = noise + doubt + EPS * (impulse + pair.bounce[:, 0]) + _wander(detail, pair.force)
         noise = noise + EPS * detail.pieces.end * pair.force.max(axis=1) + pair.sudden  # each time is rounded by itself
         held += pair.sudden[:, None]
@@ -178,13 +172,13 @@ def _positions(detail: Detail, size: Sizes, noise: Array, smooth: NDArray[np.boo
     The impact forces of a contact at rest may balance; `noise` (k, 3) is what their roundings make of v. An implicit
     step, whose nodes depend on each other, has it from its begin on.
     """
-    way, doubt = detail.integral(detail.v[:, 1:-1])
+    way, doubt = detail.integral(detail.v)
     late = EPS * detail.pieces.end[:, None]
     span = (detail.pieces.end - detail.pieces.begin)[:, None]
     fastest = np.abs(detail.v).max(axis=(1, 2))[:, None]  # a touch sets u = 0, and x of the arm follows x_o
     unit = EPS * (size.x[:, 0] + size.v[:, 0] * span) + noise * span + late * fastest + doubt
     unit = unit + _wander(detail, detail.v) + TINY
-    unit = unit + np.where(smooth, 0.0, ALL * _total(detail, detail.v))
+    unit = unit + np.where(smooth, 0.0, ALL * detail.total(detail.v))
     error = np.abs(detail.x[:, -1] - detail.x[:, 0] - way) / unit
     return Ledger("position", error[:, present].max(axis=1), np.asarray(smooth[:, present].all(axis=1)))
 
@@ -235,7 +229,7 @@ def _energy(detail: Detail, size: Sizes, pairs: list[Impacts], resolved: NDArray
         unit = unit + pair.bounce[:, 0] * np.abs(pair.d).max(axis=1)
         unit = unit + _loss_noise(detail, pair)
         power = power + (np.maximum(elastic, np.abs(pair.force)) * np.abs(pair.d)).max(axis=1)
-    lost, doubt = detail.integral(taken[:, 1:-1])
+    lost, doubt = detail.integral(taken)
     late = EPS * detail.pieces.end * power
     unit = EPS * (unit + lost) + late + doubt + _wander(detail, taken) + TINY
     within_range = np.isfinite(unit)  # squares may leave the range of numbers
@@ -251,4 +245,4 @@ def _loss_noise(detail: Detail, pair: Impacts) -> Array:
     p = detail.run.scene.system.pairs[pair.side, Law.DISSIPATION]
     rate = np.abs(pair.d) * (pair.by_u * pair.noise + pair.by_d * pair.noise_d)
     rate = rate + np.abs(pair.force) * (pair.noise_d + 0.0 * p)
-    return _total(detail, rate) / EPS
+    return detail.total(rate) / EPS

@@ -15,15 +15,15 @@ from grasp_ros.exact.integrator import Status
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Of, Transition, Work
 from grasp_ros.physics.model import penetration
 from grasp_ros.physics.system import COLUMN
-from grasp_ros.scene import Scene
+from grasp_ros.scene import Scene, SceneError
 from grasp_ros.simulation import Trajectory
 from lab.cases.case import Product, Unfinished
+from lab.oracles.metamorphic import mirror, scaling
 from lab.oracles.motion import ledgers
-from lab.oracles.related_runs import mirror, units
 from lab.oracles.replay import findings
 from lab.oracles.restart_check import digits, reversal, splitting
 from lab.oracles.rounding_bounds import DIED_OUT
-from lab.oracles.segments import Detail, Pieces, cut, detail, grid_of, pieces_of, rule
+from lab.oracles.segments import Detail, Pieces, cut, detail, grid_of, pieces_of
 from lab.reference.grasp import commands
 
 MOST_EVENTS = 2000
@@ -31,6 +31,8 @@ MOST_WORK = 100_000  # of a run
 CHEAP = 3_000  # work beyond which the relations that need more runs are left out
 OUTPUTS, ROUNDS = 201, 4  # of a run that stalls
 LIMIT = 100.0  # units of rounding
+UNITS = 4.0, 2.0, 0.5  # of length, time and mass
+SHALLOW = 1e-85  # m or m/s: below, what a touch moves, like u^3.5, may be denormal, and in other units other numbers
 SPLIT = 4  # every how many scenes a run is started anew, and run backwards
 
 
@@ -119,8 +121,8 @@ def _checks(first: Trajectory, product: Product, every: bool, compare: bool) -> 
     if first.sampled:
         yield Check("held inputs", _held(first), 0.0)
     yield from _balances(close, product)
-    for finding in findings(close):
-        yield Check(finding.name, finding.error, LIMIT)
+    for name, error in findings(close):
+        yield Check(name, error, LIMIT)
     spent = int(run.work[Work.FLIGHTS] + run.work[Work.CONTACT_STEPS] + run.work[Work.ROOT_ITERATIONS])
     if spent <= CHEAP:
         yield from _related_runs(close, first, product, every, compare)
@@ -129,22 +131,34 @@ def _checks(first: Trajectory, product: Product, every: bool, compare: bool) -> 
 def _related_runs(close: Detail, first: Trajectory, product: Product, every: bool, compare: bool) -> Iterator[Check]:
     """What takes more runs; one that ends as no run may is a failure, too."""
     part = zlib.crc32(close.run.state[-1].tobytes()) / 2**32
-    relations: list[tuple[int, Callable[[], Iterator[tuple[str, float]]], float]] = [
-        (1, partial(mirror, first, product), 0.0),
-        (1, partial(units, first, product, _smallest(close.run)), 0.0),
-        (SPLIT, partial(splitting, close, part * SPLIT % 1.0, product), LIMIT),
-        (SPLIT, partial(reversal, first, product), LIMIT),
+    relations: list[tuple[str, int, Callable[[], float | None], float]] = [
+        ("mirror", 1, partial(_mirror, first.scene, product), 0.0),
+        ("scaling", 1, partial(_units, first.scene, product, _smallest(close.run)), 0.0),
+        ("splitting", SPLIT, partial(splitting, close, part * SPLIT % 1.0, product), LIMIT),
+        ("time reversal", SPLIT, partial(reversal, first, product), LIMIT),
     ]
     if compare:
-        relations.append((1, partial(digits, first, product), LIMIT))
-    for rarely, relation, bound in relations:
+        relations.append(("reference", 1, partial(digits, first, product), LIMIT))
+    for name, rarely, relation, bound in relations:
         if not every and part * rarely >= 1.0:
             continue
         try:
-            for name, error in relation():
+            if (error := relation()) is not None:
                 yield Check(name, error, bound)
         except Unfinished:
             yield _end(product.runs[-1], product)
+
+
+def _mirror(scene: Scene, product: Product) -> float | None:
+    """Noise and sines have no mirror image."""
+    return None if any(section.endswith(("_sensor", "_sine")) for section in scene.values) else mirror(scene, product)
+
+
+def _units(scene: Scene, product: Product, smallest: float) -> float | None:
+    """Only where no number leaves its range, nor becomes denormal on the way."""
+    with suppress(SceneError):
+        return scaling(*UNITS, scene, product) if smallest >= SHALLOW else None
+    return None
 
 
 def _smallest(run: Trajectory) -> float:
@@ -155,10 +169,9 @@ def _smallest(run: Trajectory) -> float:
 
 def look(run: Trajectory, pieces: Pieces, product: Product) -> Detail:
     """The same run with outputs at the nodes of its pieces."""
-    table = rule()
-    grid = grid_of(pieces, table)
+    grid = grid_of(pieces)
     again = product.run(run.scene, np.append(grid.ravel(), run.scene.duration))
-    return detail(again, pieces, table, grid)
+    return detail(again, pieces, grid)
 
 
 def _held(run: Trajectory) -> float:

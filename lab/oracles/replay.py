@@ -24,13 +24,6 @@ AFTER: dict[Transition, int] = {
 }
 
 
-class Finding(NamedTuple):
-    """The largest error of a relation, in units of rounding."""
-
-    name: str
-    error: float
-
-
 class Units(NamedTuple):
     """What rounding explains of u and u' of a pair, (k, n + 2)."""
 
@@ -38,8 +31,8 @@ class Units(NamedTuple):
     d: Array  # m/s
 
 
-def findings(detail: Detail) -> Iterator[Finding]:
-    """All relations between events and states."""
+def findings(detail: Detail) -> Iterator[tuple[str, float]]:
+    """The largest errors of all relations between events and states, in units of rounding."""
     size = sizes(detail)
     pairs = impacts(detail, size)
     acting = accelerations(detail, pairs, apart=True)
@@ -82,7 +75,7 @@ def _spans(detail: Detail, body: int, modes: tuple[int, ...]) -> Iterator[tuple[
 
 
 def _worst(detail: Detail, body: int, modes: tuple[int, ...], errors: Callable[[int], dict[str, Array]]
-           ) -> Iterator[Finding]:
+           ) -> Iterator[tuple[str, float]]:
     """The largest errors in each mode; at the begin those of the mode that fits best."""
     worst: dict[str, float] = {}
     by_mode = {mode: errors(mode) for mode in modes}
@@ -92,10 +85,10 @@ def _worst(detail: Detail, body: int, modes: tuple[int, ...], errors: Callable[[
         for name, error in min(found, key=lambda errors: max(errors.values(), default=0.0)).items():
             worst[name] = max(worst.get(name, 0.0), error)
     for name, error in worst.items():
-        yield Finding(name, error)
+        yield name, error
 
 
-def _pair_modes(detail: Detail, pair: Impacts, unit: Units) -> Iterator[Finding]:
+def _pair_modes(detail: Detail, pair: Impacts, unit: Units) -> Iterator[tuple[str, float]]:
     p = detail.run.scene.system.pairs[pair.side, Law.DISSIPATION]
     beyond = -1.0 / p - pair.d if p > 0.0 else np.full_like(pair.d, -np.inf)  # > 0: separating faster than 1/p
 
@@ -117,7 +110,7 @@ def _at_events(detail: Detail, times: Array) -> tuple[NDArray[np.int64], NDArray
     return piece[hit], hit
 
 
-def _pair_events(detail: Detail, pair: Impacts, unit: Units) -> Iterator[Finding]:
+def _pair_events(detail: Detail, pair: Impacts, unit: Units) -> Iterator[tuple[str, float]]:
     """u = 0 at touch and release, u' = -1/p at the others, from the state at the recorded time.
 
     Of several events of the pair at the same time, less than a rounding apart, it is the state at the first.
@@ -137,10 +130,10 @@ def _pair_events(detail: Detail, pair: Impacts, unit: Units) -> Iterator[Finding
     speed = np.full_like(depth, np.inf)
     if p > 0.0:
         speed = np.abs(pair.d[piece, 0] + 1.0 / p) / np.maximum(unit.d[piece, 0], unit.d[before].max(axis=1))
-    yield Finding("event time", float(np.where(through_zero, depth, speed).max()))
+    yield "event time", float(np.where(through_zero, depth, speed).max())
 
 
-def _object(detail: Detail, pairs: list[Impacts], acting: Array) -> Iterator[Finding]:
+def _object(detail: Detail, pairs: list[Impacts], acting: Array) -> Iterator[tuple[str, float]]:
     """An object that sticks rests, and what pushes it is within its friction; v_o = 0 where it begins or ends."""
     limit = detail.run.scene.system.coulomb
     late = EPS * detail.t
@@ -161,4 +154,4 @@ def _object(detail: Detail, pairs: list[Impacts], acting: Array) -> Iterator[Fin
     if len(hit):
         scale = EPS * np.abs(detail.v[piece, :, OBJECT]).max(axis=1) + late[piece, 0] * acting[piece, 0, OBJECT] + TINY
         scale = scale + push_noise(detail, pairs)[np.maximum(piece - 1, 0)]  # on the way there
-        yield Finding("event time", float((v[piece, 0] / scale).max()))
+        yield "event time", float((v[piece, 0] / scale).max())

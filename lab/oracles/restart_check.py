@@ -5,14 +5,12 @@ A run and a restarted one differ by rounding, as far as the motion lets it grow;
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Entry, Law, Of, Transition, Work
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
@@ -45,7 +43,7 @@ REFERENCE_STEPS = 100  # contact steps beyond which the reference, which counts 
 REFERENCE_SECONDS = 3.0
 
 
-def splitting(detail: Detail, part: float, product: Product) -> Iterator[tuple[str, float]]:
+def splitting(detail: Detail, part: float, product: Product) -> float:
     """A run restarted from an output, over the rest of its input interval, beside one from a state nudged a little.
 
     Outputs beside an event are left out: `motion` compares them with the state at the event.
@@ -82,7 +80,7 @@ def splitting(detail: Detail, part: float, product: Product) -> Iterator[tuple[s
     slowing = np.where(touched, _slowing(detail.bodies[first]), 0.0)  # on the way to a touch that roundings of x shift
     unit[:, 1::2] += EPS * reached[:, ::2] * (rates(detail.bodies[first]) + slowing)[:, [LEFT, OBJECT, RIGHT]]
     error = (np.abs(again - whole) / unit)[:, there].max(axis=1) / walk(detail.run, 1)
-    yield "splitting", float(error[~_beside_event(detail, pieces).ravel()].max(initial=0.0))
+    return float(error[~_beside_event(detail, pieces).ravel()].max(initial=0.0))
 
 
 def _beside_event(detail: Detail, pieces: slice) -> NDArray[np.bool_]:
@@ -175,25 +173,25 @@ def _end_beside_nudged(run: Trajectory, start: Array, product: Product) -> tuple
     return end, (grown + EPS * size) * (walk(run, 1) + len(run.event_table)) + TINY
 
 
-def reversal(run: Trajectory, product: Product) -> Iterator[tuple[str, float]]:
-    """A motion without losses, run backwards, ends where it began, O8."""
+def reversal(run: Trajectory, product: Product) -> float | None:
+    """A motion without losses, run backwards, ends where it began, O8; None: there are losses or held forces."""
     system = run.scene.system
     lossy = system.closed_loop[:, Of.DAMPING].any() or system.pairs[:, Law.DISSIPATION].any() or system.coulomb
     if lossy or run.sampled or system.external:
-        return
+        return None
     begin, unit = _end_beside_nudged(run, np.nan_to_num(run.state[-1]) * FLIP, product)
-    yield "time reversal", float((np.abs(begin * FLIP - run.scene.initial_state) / unit).max())
+    return float((np.abs(begin * FLIP - run.scene.initial_state) / unit).max())
 
 
-def digits(run: Trajectory, product: Product) -> Iterator[tuple[str, float]]:
-    """The end by another method, in 25 digits, if that takes no longer than some seconds."""
+def digits(run: Trajectory, product: Product) -> float | None:
+    """The end beside that by another method, in 25 digits; None: that takes longer than some seconds."""
     scene = run.scene
-    if run.work[Work.CONTACT_STEPS] > REFERENCE_STEPS:
-        return
+    if run.work[Work.CONTACT_STEPS] > REFERENCE_STEPS or scene.sampled or scene.system.external:
+        return None
     try:
         with deadline(REFERENCE_SECONDS):
             expected = reference(scene, [0.0, scene.duration])[-1]
-    except (Deadline, RuntimeError, Refused):  # the last: not the paper's grasp
-        return
+    except (Deadline, RuntimeError):
+        return None
     end, unit = _end_beside_nudged(run, scene.initial_state, product)
-    yield "reference", float((np.abs(end - expected) / unit).max())
+    return float((np.abs(end - expected) / unit).max())

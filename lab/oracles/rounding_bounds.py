@@ -52,8 +52,7 @@ def walk(run: Trajectory, parts: int) -> float:
 
 def largest(states: Array) -> Array:
     """The largest position and the largest speed of states (n, 6), for each column (6,); what is absent counts as 0."""
-    found: Array = np.tile(np.abs(np.nan_to_num(states).reshape(-1, 3, 2)).max(axis=(0, 1)), 3)
-    return found
+    return np.asarray(np.tile(np.abs(np.nan_to_num(states).reshape(-1, 3, 2)).max(axis=(0, 1)), 3))
 
 
 def largest_in_segment(detail: Detail, values: Array) -> Array:
@@ -61,8 +60,7 @@ def largest_in_segment(detail: Detail, values: Array) -> Array:
     segment = detail.pieces.segment
     largest = np.zeros((int(segment.max(initial=0)) + 1, *values.shape[1:]))
     np.maximum.at(largest, segment, values)
-    found: Array = largest[segment]
-    return found
+    return np.asarray(largest[segment])
 
 
 def rates(bodies: Array) -> Array:
@@ -168,8 +166,7 @@ def accelerations(detail: Detail, pairs: list[Impacts], apart: bool = False) -> 
         total[..., OBJECT] += size(push)
     total = np.abs(total)
     total[..., OBJECT] += detail.run.scene.system.coulomb
-    found: Array = total / np.where(mass > 0.0, mass, 1.0)
-    return found
+    return np.asarray(total / np.where(mass > 0.0, mass, 1.0))
 
 
 def impact_speed(detail: Detail, pairs: list[Impacts]) -> Array:
@@ -179,8 +176,7 @@ def impact_speed(detail: Detail, pairs: list[Impacts]) -> Array:
         momentum[:, pair.side] += pair.bounce[:, 0]
         momentum[:, OBJECT] += pair.bounce[:, 0]
     mass = detail.bodies[..., Of.MASS]
-    found: Array = momentum / np.where(mass > 0.0, mass, 1.0)
-    return found
+    return np.asarray(momentum / np.where(mass > 0.0, mass, 1.0))
 
 
 def push_noise(detail: Detail, pairs: list[Impacts]) -> Array:
@@ -188,9 +184,7 @@ def push_noise(detail: Detail, pairs: list[Impacts]) -> Array:
     mass, pieces = detail.bodies[:, OBJECT, Of.MASS], detail.pieces
     gained = force_noise(detail, pairs) * (pieces.end - pieces.begin) / np.where(mass > 0.0, mass, 1.0)
     total = np.cumsum(gained)
-    _, first, of = np.unique(pieces.segment, return_index=True, return_inverse=True)
-    found: Array = total - (total - gained)[first[of]]
-    return found
+    return np.asarray(total - (total - gained)[pieces.first])
 
 
 def force_noise(detail: Detail, pairs: list[Impacts]) -> Array:
@@ -201,11 +195,8 @@ def force_noise(detail: Detail, pairs: list[Impacts]) -> Array:
 
 def elapsed(detail: Detail) -> Array:
     """From the begin of the segment to the end of the piece, (k, 1, 1) in s."""
-    segment = detail.pieces.segment
-    start = np.full(int(segment.max(initial=0)) + 1, np.inf)
-    np.minimum.at(start, segment, detail.pieces.begin)
-    found: Array = (detail.pieces.end - start[segment])[:, None, None]
-    return found
+    pieces = detail.pieces
+    return np.asarray((pieces.end - pieces.begin[pieces.first])[:, None, None])
 
 
 def impacts(detail: Detail, size: Sizes) -> list[Impacts]:
@@ -221,8 +212,7 @@ def impacts(detail: Detail, size: Sizes) -> list[Impacts]:
 def _handed_on(detail: Detail, pair: Impacts) -> Array:
     """Roundings of u' of a pair that the object has, (k, 1) in m/s: as far as it follows that pair's dissipation."""
     rate = pair.by_d.max(axis=1, keepdims=True) / detail.bodies[:, None, OBJECT, Of.MASS]
-    found: Array = pair.noise_d * np.minimum(1.0, rate * elapsed(detail)[:, 0])
-    return found
+    return np.asarray(pair.noise_d * np.minimum(1.0, rate * elapsed(detail)[:, 0]))
 
 
 def _closing(detail: Detail, side: int) -> tuple[Array, Array]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 from itertools import pairwise
 from typing import NamedTuple
@@ -26,6 +27,7 @@ GRADING = 0.2  # length of one level by that of the next
 CUTS, CUT, PARTS = 12, 0.1, 8  # levels, their grading, and equal parts of a piece that is looked at more closely
 SHORTEST = 64.0 * EPS  # of a piece, relative to its time: nodes must differ
 INNER, FIRST, LAST, WHOLE = range(4)  # which ends of a piece are ends of its segment
+Part = tuple[float, float, int, int]  # begin, end, kind and segment of a piece
 PLACES = [COLUMN[body] for body in (LEFT, RIGHT, OBJECT)]
 
 
@@ -43,7 +45,12 @@ class Pieces(NamedTuple):
     begin: Array  # (k,) s
     end: Array  # (k,) s
     kind: NDArray[np.int64]  # (k,) INNER, FIRST, LAST or WHOLE
-    segment: NDArray[np.int64]  # (k,) number of the segment
+    segment: NDArray[np.int64]  # (k,) number of the segment, ascending
+
+    @property
+    def first(self) -> NDArray[np.int64]:
+        """The first piece (k,) of the segment of each."""
+        return np.asarray(np.searchsorted(self.segment, self.segment))
 
 
 class Detail(NamedTuple):
@@ -58,22 +65,21 @@ class Detail(NamedTuple):
     bodies: Array  # (k, 3, 4): m, K, C, f as they act in a piece, see `layout`
 
     def integral(self, values: Array) -> tuple[Array, Array]:
-        """Integrals (k, ...) over the pieces of values (k, n, ...) at the inner nodes, and the error's estimate.
+        """Integrals (k, ...) over the pieces of values (k, n + 2, ...), and the error's estimate.
 
         That is the larger of two differences: where the nodes are too few for a motion one may vanish by chance.
         """
-        fine, *coarse = (_sums(table, values) for table in self.weights)
+        fine, *coarse = (_sums(table, values[:, 1:-1]) for table in self.weights)
         return fine, np.maximum(*(np.abs(fine - other) for other in coarse))
 
     def total(self, values: Array) -> Array:
-        """The integrals alone."""
-        return _sums(self.weights[0], values)
+        """Integrals (k, ...) of the size of values (k, n + 2, ...)."""
+        return _sums(self.weights[0], np.abs(values[:, 1:-1]))
 
 
 def _sums(weights: Array, values: Array) -> Array:
     """Sums (k, ...) of values (k, n, ...) by weights (k, n)."""
-    found: Array = np.einsum("kn,kn...->k...", weights, values)
-    return found
+    return np.asarray(np.einsum("kn,kn...->k...", weights, values))
 
 
 @cache
@@ -108,36 +114,36 @@ def pieces_of(run: Trajectory) -> Pieces:
     near = GRADING ** np.arange(levels, 0.0, -1.0)
     middle = np.linspace(near[-1], 1.0 - near[-1], min(max(each - 2 * levels, MIDDLE[0]), MIDDLE[1]) + 1)[1:-1]
     cuts = np.concatenate([[0.0], near, middle, 1.0 - near[::-1], [1.0]])
-    rows = []
+    rows: list[Part] = []
     for number, (a, b) in enumerate(spans):
-        at = a + (b - a) * cuts
-        at[-1] = b
-        at = at[np.concatenate([[True], np.diff(at) > SHORTEST * b])]
-        at[-1] = b
-        last = len(at) - 2
-        for k, (begin, end) in enumerate(pairwise(at.tolist())):
-            rows.append((begin, end, FIRST * (k == 0) + LAST * (k == last), number))
+        rows += _parts(a, b, cuts, WHOLE, number)
     return _table(rows)
 
 
 def cut(pieces: Pieces, where: NDArray[np.bool_]) -> tuple[Pieces, NDArray[np.int64]]:
     """Some pieces cut into parts, ever shorter ones at both ends, where a layer may hide; also the first of each."""
     near = CUT ** np.arange(CUTS, 1.0, -1.0)
-    share = np.concatenate([[0.0], near, np.linspace(CUT, 1.0 - CUT, PARTS + 1), 1.0 - near[::-1]])
+    share = np.concatenate([[0.0], near, np.linspace(CUT, 1.0 - CUT, PARTS + 1), 1.0 - near[::-1], [1.0]])
     first: list[int] = []
-    rows: list[tuple[float, float, int, int]] = []
+    rows: list[Part] = []
     for begin, end, kind, number, cuts in zip(*pieces, where, strict=True):
         first.append(len(rows))
-        at = begin + (end - begin) * (share if cuts else share[:1])
-        at = np.append(at[np.concatenate([[True], np.diff(at) > SHORTEST * end])], end)
-        last = len(at) - 2
-        for k, (a, b) in enumerate(pairwise(at.tolist())):
-            rows.append((a, b, kind & (FIRST * (k == 0) | LAST * (k == last)), number))
+        rows += _parts(begin, end, share if cuts else share[[0, -1]], kind, number)
     return _table(rows), np.array(first)
 
 
-def _table(rows: list[tuple[float, float, int, int]]) -> Pieces:
-    """Pieces of rows with begin, end, kind and segment."""
+def _parts(begin: float, end: float, share: Array, kind: int, segment: int) -> Iterator[Part]:
+    """Parts of a piece, cut at ascending shares of it from 0 to 1, but none that is too short."""
+    at = begin + (end - begin) * share[:-1]
+    keep = np.minimum(np.diff(at, prepend=-np.inf), end - at) > SHORTEST * end
+    keep[0] = True
+    at = np.append(at[keep], end)
+    last = len(at) - 2
+    for k, (a, b) in enumerate(pairwise(at.tolist())):
+        yield a, b, kind & (FIRST * (k == 0) | LAST * (k == last)), segment
+
+
+def _table(rows: list[Part]) -> Pieces:
     table = np.array(rows).reshape(-1, 4)
     return Pieces(table[:, 0], table[:, 1], table[:, 2].astype(np.int64), table[:, 3].astype(np.int64))
 
@@ -150,15 +156,15 @@ def _changes(scene: Scene) -> Array:
     return np.array(sorted(ticks)) * scene.period_ns / NANOSECONDS
 
 
-def grid_of(pieces: Pieces, table: Rule) -> Array:
+def grid_of(pieces: Pieces) -> Array:
     """Times (k, n + 2) of the ends and the nodes of all pieces."""
     length = pieces.end - pieces.begin
-    inner = pieces.begin[:, None] + length[:, None] * table.nodes[pieces.kind]
+    inner = pieces.begin[:, None] + length[:, None] * rule().nodes[pieces.kind]
     grid = np.column_stack([pieces.begin, inner, pieces.end])
     return np.minimum(np.maximum.accumulate(grid, axis=1), pieces.end[:, None])
 
 
-def detail(run: Trajectory, pieces: Pieces, table: Rule, grid: Array) -> Detail:
+def detail(run: Trajectory, pieces: Pieces, grid: Array) -> Detail:
     """The states of a run whose output times are those of `grid_of`, and after them any others."""
     states = np.nan_to_num(run.state[: grid.size]).reshape(*grid.shape, 6)
     system = run.scene.system
@@ -170,5 +176,5 @@ def detail(run: Trajectory, pieces: Pieces, table: Rule, grid: Array) -> Detail:
         ticks = tick_of(run.scene, 0.5 * (pieces.begin + pieces.end)).tolist()
         acting[..., Of.FORCE] += np.array([system.external_at(tick) for tick in ticks]).reshape(-1, 3)
     places = np.array(PLACES)
-    weights = np.array([table.weights, *table.coarse])[:, pieces.kind] * (pieces.end - pieces.begin)[:, None]
+    weights = np.array([rule().weights, *rule().coarse])[:, pieces.kind] * (pieces.end - pieces.begin)[:, None]
     return Detail(run, pieces, weights, grid, states[..., places], states[..., places + 1], acting)

@@ -13,9 +13,9 @@ impulse is below the accuracy, and only there.
     gaps       what ends a mode
     automaton  transitions
     run        steps and outputs
-    solve      grasps and scenes
+    solve      scenes
 """
 
-from lab.reference.solve import Reference, integrate, integrate_scene
+from lab.reference.solve import Reference, integrate
 
-__all__ = ["Reference", "integrate", "integrate_scene"]
+__all__ = ["Reference", "integrate"]

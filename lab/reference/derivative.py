@@ -13,7 +13,7 @@ import numpy as np
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from lab.reference.plant import SIDES
-from lab.reference.solve import Reference, integrate_scene
+from lab.reference.solve import Reference, integrate
 
 STEP = 2.0**-44  # of a number near 1: so small that no derivative changes over it; sums in a scene stay exact
 DIGITS = 30
@@ -37,7 +37,7 @@ def difference(scene: Scene, key: str, times: Sequence[float]) -> Derivative:
     step = STEP * max(1.0, 2.0 ** round(math.log2(abs(value) or 1.0)))
     signed = "position" in name or "velocity_m" in name or "set_point" in name
     low, high = value - step if value >= step or signed else value, value + step
-    first, second = (integrate_scene(scene.changed({key: at}), times, DIGITS) for at in (low, high))
+    first, second = (integrate(scene.changed({key: at}), times, DIGITS) for at in (low, high))
     with gmpy2.context(precision=4 * DIGITS):
         width = gmpy2.mpq(Fraction(high) - Fraction(low))
         state = [[float((b - a) / width) for a, b in zip(*rows, strict=True)]

@@ -6,7 +6,6 @@ that K = 0, C = 0 and critical damping are no special cases.
 
 from __future__ import annotations
 
-from decimal import Decimal
 from typing import Any, NamedTuple
 
 import gmpy2
@@ -24,10 +23,7 @@ def number(value: Real, decimal: bool = False) -> Real:
     """An mpfr of the current precision; a float stands for its shortest decimal form if `decimal`."""
     if isinstance(value, float):
         value = repr(float(value)) if decimal else float(value)
-    result = mpfr(str(value) if isinstance(value, Decimal) else value)
-    if not gmpy2.is_finite(result):
-        raise ValueError(f"not a finite number: {value!r}")
-    return result
+    return mpfr(value)
 
 
 def propagator(trace: Real, det: Real, t: Real) -> tuple[tuple[Real, Real], tuple[Real, Real]]:

@@ -8,7 +8,6 @@ import gmpy2
 from gmpy2 import mpfr
 
 from lab.reference.automaton import Automaton
-from lab.reference.deadline import Deadline
 from lab.reference.gaps import gaps
 from lab.reference.motion import Pair
 from lab.reference.plant import OBJECT, SIDES, Plant, Real, Reals, State
@@ -16,6 +15,7 @@ from lab.reference.roots import bound_at, first_crossing, value_at
 from lab.reference.series import Expansion, expand, reach
 
 EXTRA_DIGITS = 10  # of a step beyond those asked for
+EXPONENTS = 1 << 40  # nothing overflows
 EXTRA_BITS = 110  # of the arithmetic beyond those of a step
 ORDER = 1.2  # of a series, for each digit: the cheapest
 SAME = 1000  # steps' errors within which events are one instant
@@ -23,6 +23,10 @@ STILL = 40  # events in a row that last no time: the modes contradict each other
 NEAR = 10  # steps from u = 0: there w is the better variable
 FAR = 12  # shortest time scales: so long a wait is flown at once
 Row = tuple[Real, ...]  # x_l, v_l, x_o, v_o, x_r, v_r
+
+
+class Spent(Exception):  # noqa: N818 - an instant, not an error
+    """The steps are used up."""
 
 
 def precision(digits: int) -> int:
@@ -35,9 +39,8 @@ class Run(Automaton):
 
     Parameters
     ----------
-    plant : Plant
-    x, v : lists (3,) of mpfr, m and m/s
-        By body, at t = 0.
+    plant, x, v
+        See `Motion`.
     outputs : list of mpfr, s
         Ascending times.
     digits : int
@@ -66,7 +69,7 @@ class Run(Automaton):
 
         Raises
         ------
-        Deadline
+        Spent
             If the steps are used up; what was reached stays.
         RuntimeError
             If the modes contradict each other.
@@ -74,7 +77,7 @@ class Run(Automaton):
         still = 0
         while self.state.t < end:
             if self.steps >= self._budget:
-                raise Deadline
+                raise Spent
             before = self.state.t
             self._step(end)
             still = 0 if self.state.t > before else still + 1

@@ -1,9 +1,10 @@
-"""The motions of grasps and of scenes in high precision."""
+"""The motions of scenes in high precision."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -12,16 +13,10 @@ import numpy as np
 from gmpy2 import mpfr
 from numpy.typing import NDArray
 
-from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene
 from lab.reference.automaton import Event
-from lab.reference.deadline import Deadline
-from lab.reference.grasp import Grasp
 from lab.reference.plant import LEFT, OBJECT, RIGHT, Body, Law, Plant, Real, Reals, number
-from lab.reference.run import Row, Run, precision
-
-STEP_BUDGET = 100_000
-EXPONENTS = 1 << 40  # nothing overflows
+from lab.reference.run import EXPONENTS, Row, Run, Spent, precision
 
 
 class Reference(NamedTuple):
@@ -53,130 +48,56 @@ def _reference(grid: Reals, run: Run) -> Reference:
     return Reference(grid[: len(run.rows)], run.rows, touches, releases, run.events)
 
 
-def _arm(arm: Arm, force: float, feedback: bool, decimal: bool) -> Body:
-    """The parameters of an arm, checked."""
-    mass, k, c, kp, kv = (number(value, decimal) for value in arm)
-    stiffness, damping = (k + kp, c + kv) if feedback else (k, c)
-    if mass <= 0 or min(stiffness, damping) < 0:
-        raise ValueError(f"a mass must be positive, stiffness and damping must not be negative: {arm}")
-    return Body.of(mass, stiffness, damping, number(force, decimal))
-
-
-def _law(contact: Contact, decimal: bool) -> Law | None:
-    """The parameters of a pair, checked."""
-    law = Law(*(number(value, decimal) for value in contact))
-    if min(law) < 0:
-        raise ValueError(f"H and p must not be negative: {contact}")
-    return law if law.hertzian else None
-
-
-def integrate(
-    grasp: Grasp,
-    state0: Sequence[float],
-    times: Sequence[float],
-    digits: int = 30,
-    force: Sequence[float] = (0.0, 0.0),
-    feedback: bool = True,
-    decimal: bool = False,
-) -> Reference:
-    """The motion of a grasp in high precision.
-
-    Every number may be a float, an int, a str, a Decimal or an mpfr.
-
-    Parameters
-    ----------
-    grasp : Grasp
-        Impact forces of a side with H = 0 do not exist, and its contacts are not recorded.
-    state0 : sequence (6,), m and m/s
-        x_l, v_l, x_o, v_o, x_r, v_r at t = 0. A pair may start in contact; that is no touch.
-    times : sequence (N,), s
-        Ascending, from 0; the states are given here.
-    digits : int
-        Each step keeps this many digits; a scene that amplifies errors ends with fewer.
-    force : sequence (2,), N
-        Constant forces on the left and the right arm, added to the feedback if there is one.
-    feedback : bool
-        Whether the continuous feedback (4), (5) acts.
-    decimal : bool
-        A float stands for its shortest decimal form, 0.2 for one fifth, rather than for its binary value.
-
-    Returns
-    -------
-    Reference
-
-    Raises
-    ------
-    ValueError
-        If a number is not finite, a mass is not positive, K, C, H or p is negative, `state0` has not six
-        components, or the times are not ascending from 0.
-    RuntimeError
-        If the motion has more steps than STEP_BUDGET.
-    """
-    with gmpy2.context(precision=precision(digits), emax=EXPONENTS, emin=-EXPONENTS):
-        grid, start = ([number(value, decimal) for value in values] for values in (times, state0))
-        if not grid or grid[0] != 0 or any(b <= a for a, b in pairwise(grid)):
-            raise ValueError("times must ascend from 0")
-        mass, zero = number(grasp.object_mass, decimal), mpfr(0)
-        if len(start) != 6 or mass <= 0:
-            raise ValueError("state0 needs six components, and the object a positive mass")
-        arms = [_arm(arm, push, feedback, decimal) for arm, push in zip((grasp.left, grasp.right), force, strict=True)]
-        laws = _law(grasp.left_contact, decimal), _law(grasp.right_contact, decimal)
-        plant = Plant((arms[LEFT], arms[RIGHT], Body.of(mass, zero, zero, zero)), laws, zero)
-        run = Run(plant, *_by_body(start), grid, digits, STEP_BUDGET)
-        try:
-            run.advance(grid[-1])
-        except Deadline:
-            raise RuntimeError(f"more than {STEP_BUDGET} steps before t = {float(run.state.t)} s") from None
-        return _reference(grid, run)
-
-
 def _by_body(start: Reals) -> tuple[Reals, Reals]:
     """Positions and velocities in the order of the bodies."""
     return [start[0], start[4], start[2]], [start[1], start[5], start[3]]
 
 
-def integrate_scene(scene: Scene, times: Iterable[float], digits: int = 25, budget: float = math.inf) -> Reference:
+def integrate(scene: Scene, times: Iterable[Real], digits: int = 25, budget: float = math.inf,
+              state: Sequence[Real] | None = None, decimal: bool = False) -> Reference:
     """The motion of a scene in high precision.
 
-    The floats of the system that the scene makes are taken exactly; forces act from tick to tick, and commands are
-    computed by the controllers from the states of this motion.
+    The floats of the system that the scene makes are taken exactly, a continuous feedback added to them; forces act
+    from tick to tick, and commands are computed by the controllers from the states of this motion.
 
     Parameters
     ----------
     scene : Scene
-    times : iterable of float, s
-        Ascending, within the horizon.
+    times : iterable of number, s
+        Ascending, within the horizon; a float, or a str or an mpfr with more digits.
     digits : int
-        See `integrate`.
+        Each step keeps this many digits; a scene that amplifies errors ends with fewer.
     budget : float
         Limit of steps; the states at the times reached until then are given.
-
-    Returns
-    -------
-    Reference
+    state : sequence (6,) of number, optional, m and m/s
+        x_l, v_l, x_o, v_o, x_r, v_r at t = 0; by default those of the scene. A pair may start in contact; that is no
+        touch.
+    decimal : bool
+        A float stands for its shortest decimal form, 0.2 for one fifth, rather than for its binary value.
 
     Raises
     ------
     RuntimeError
         If the modes contradict each other.
     """
+    exact = partial(number, decimal=decimal)
     with gmpy2.context(precision=precision(digits), emax=EXPONENTS, emin=-EXPONENTS):
-        grid = [number(float(t)) for t in times]
-        plant = _plant(scene)
-        start = [number(value) for value in scene.system.state.tolist()]
+        grid, system = [exact(t) for t in times], scene.system
+        plant = _plant(scene, exact)
+        start = [exact(value) for value in (system.state.tolist() if state is None else state)]
         run = Run(plant, *_by_body(start), grid, digits, budget)
-        system, waiting = scene.system, [[mpfr(0)] * 3] * scene.system.delay
+        waiting = [[mpfr(0)] * 3] * system.delay
         try:
             for tick, following in pairwise(_ticks(scene)):
-                forces = [number(force) for force in system.external_at(tick).tolist()]
+                forces = [exact(force) for force in system.external_at(tick).tolist()]
                 if scene.sampled:
                     waiting.append(_commands(scene, tick, run))
                     forces = [a + b for a, b in zip(forces, waiting.pop(0), strict=True)]
                 run.enter(_pushed(plant, forces))
-                run.advance(number(float(scene.time_of(following))))
+                run.advance(min(exact(float(scene.time_of(following))), grid[-1]))
                 if len(run.rows) == len(grid):
                     break
-        except Deadline:
+        except Spent:
             pass
         return _reference(grid, run)
 
@@ -189,14 +110,17 @@ def _ticks(scene: Scene) -> list[int]:
     return sorted({0, *changes, scene.ticks})
 
 
-def _plant(scene: Scene) -> Plant:
-    """What a scene simulates; the continuous feedback is in it."""
+def _plant(scene: Scene, exact: Callable[[float], Real]) -> Plant:
+    """What a scene simulates; the continuous feedback is in it, added here and not by the product."""
     system = scene.system
-    rows = (system.bodies if scene.sampled else system.closed_loop).tolist()
-    left, right, thing = (Body.of(*map(number, row)) if row[0] else None for row in rows)
+    rows = system.bodies.tolist()
+    for side, law in () if scene.sampled else system.laws.items():
+        kp, kv, set_point, feed_forward, *_ = law.row.tolist()
+        rows[side] = np.add(rows[side], [0.0, kp, kv, kp * set_point + feed_forward]).tolist()
+    left, right, thing = (Body.of(*map(exact, row)) if row[0] else None for row in rows)
     pairs = system.pairs.tolist()
-    laws = [Law(*map(number, pairs[side])) if side in system.contacts else None for side in (LEFT, RIGHT)]
-    return Plant((left, right, thing), (laws[LEFT], laws[RIGHT]), number(system.coulomb))
+    laws = [Law(*map(exact, pairs[side])) if side in system.contacts else None for side in (LEFT, RIGHT)]
+    return Plant((left, right, thing), (laws[LEFT], laws[RIGHT]), exact(system.coulomb))
 
 
 def _pushed(plant: Plant, forces: Reals) -> Plant:

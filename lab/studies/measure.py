@@ -13,9 +13,8 @@ from grasp_ros.accuracy import measure
 from grasp_ros.accuracy.measure import NOT_INSTALLED, Contender, Record, Truth
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.scene import Scene
-from lab import reference
+from lab.reference import integrate
 from lab.reference.deadline import Deadline, deadline
-from lab.reference.grasp import grasp_of
 from lab.studies.records import Journal, scene_key
 
 DIGITS = 25
@@ -51,7 +50,7 @@ def truth(scene: Scene, journal: Journal) -> Truth:
 
 
 def _reference(scene: Scene, grid: list[float]) -> Known:
-    exact = reference.integrate(grasp_of(scene), scene.initial_state.tolist(), grid, digits=DIGITS)
+    exact = integrate(scene, grid, DIGITS)
     return Known(exact.as_array().tolist(), (len(exact.touches[LEFT]), len(exact.touches[RIGHT])))
 
 

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oracles import CASES, Run, done, make_grasp, reference_of, run
+from oracles import CASES, Run, done, reference_of, run
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
-from grasp_ros.physics.model import Arm
-from lab.cases.scenes import contacts
+from grasp_ros.physics.model import Arm, Contact
+from lab.cases.scenes import contacts, grasp
 from lab.reference import integrate
 from lab.reference.grasp import grasp_of
 
@@ -71,11 +71,12 @@ def test_switches_against_the_reference(name: str) -> None:
 def test_random_clamped_scenes_against_the_reference(seed: int) -> None:
     rng = np.random.default_rng(seed)
     arm = Arm(float(rng.uniform(0.5, 2)), 10.0, 0.2, float(rng.uniform(5, 80)), float(rng.uniform(0, 6)))
-    grasp = make_grasp(arm, 10.0 ** rng.uniform(2, 4), float(rng.uniform(5, 30)), float(rng.uniform(0.3, 3)))
+    contact, mass = Contact(10.0 ** rng.uniform(2, 4), float(rng.uniform(5, 30))), float(rng.uniform(0.3, 3))
     start = [-0.3, float(rng.uniform(-1, 1)), 0.0, 0.0, float(rng.uniform(0.1, 0.5)), 0.0]
     grid = np.linspace(0.0, 3.0, 61)
-    reference = integrate(grasp, start, grid.tolist(), digits=16)
-    result = run(grasp, start, 3.0, grid)
+    scene = grasp(start, 3.0, left=arm, contact=contact, mass=mass)
+    reference = integrate(scene, grid, digits=16)
+    result = run(grasp_of(scene), start, 3.0, grid)
     done(result)
     for side in (LEFT, RIGHT):
         begins, ends = contacts(result.integrator.events, side)

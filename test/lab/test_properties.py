@@ -30,21 +30,20 @@ from lab.cases.scenes import ELASTIC, distance, grasp, reference
 from lab.drills import fuzz
 from lab.oracles import properties
 from lab.oracles.metamorphic import reversal
-from lab.oracles.properties import Check, examine
+from lab.oracles.properties import examine
 
 FIXED = settings(
     derandomize=True, database=None, deadline=None, max_examples=100, phases=(Phase.explicit, Phase.generate),
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much],
 )
-DRAWS = 100
 LONG = ("heavy_arm_beside_a_light_contact", "hundreds_of_small_impacts_within_a_period",
         "slips_between_a_thousand_impacts")
 
 
-def drawn(draw_scene: Callable[[Draw], Scene]) -> list[Scene]:
+def drawn(draw_scene: Callable[[Draw], Scene], draws: int = 100) -> list[Scene]:
     """The same scenes whatever else runs: hypothesis mixes numbers from the sources of the day into its floats."""
     rng = np.random.default_rng(0)
-    return [inside(draw_scene, rng) for _ in range(DRAWS)]
+    return [inside(draw_scene, rng) for _ in range(draws)]
 
 
 @pytest.mark.slow
@@ -79,18 +78,17 @@ def test_no_kernel_reads_what_it_has_not_written(rubbish: float) -> None:
 
 
 def test_ordinary_scenes_cover_what_they_should() -> None:
-    rng = np.random.default_rng(0)
-    drawn = [inside(draw_ordinary, rng) for _ in range(300)]
-    assert 50 < sum(scene.sampled for scene in drawn) < 150
-    masses = [scene.values["object"]["mass_kg"] for scene in drawn]
+    found = drawn(draw_ordinary, 300)
+    assert 50 < sum(scene.sampled for scene in found) < 150
+    masses = [scene.values["object"]["mass_kg"] for scene in found]
     assert max(masses) / min(masses) > 1e9
-    contacts = [scene.values["left_contact"] for scene in drawn if "left_contact" in scene.values]
+    contacts = [scene.values["left_contact"] for scene in found if "left_contact" in scene.values]
     stiffness = [contact["hertz_N_per_m1_5"] for contact in contacts]
     assert max(stiffness) / min(stiffness) > 1e9
-    assert sum("right_arm" not in scene.values for scene in drawn) > 5
-    assert sum(not scene.system.closed_loop[:, Of.DAMPING].any() for scene in drawn) > 5
+    assert sum("right_arm" not in scene.values for scene in found) > 5
+    assert sum(not scene.system.closed_loop[:, Of.DAMPING].any() for scene in found) > 5
     effects = {"left_actuator", "left_sensor", "loop", "object_friction", "tilt", "object_pulse"}
-    assert effects <= {section for scene in drawn for section in scene.values}
+    assert effects <= {section for scene in found for section in scene.values}
 
 
 @pytest.mark.parametrize(("draw_scene", "most"), [(draw_ordinary, 15), (draw_degenerate, 30)])
@@ -106,25 +104,21 @@ def test_few_draws_lie_outside_the_domain(draw_scene: Callable[[Draw], Scene], m
 
 
 def test_degenerate_scenes_cover_all_degeneracies() -> None:
-    rng = np.random.default_rng(0)
-    drawn = [inside(draw_degenerate, rng) for _ in range(1000)]
-    degeneracies = Counter(degeneracy for scene in drawn for degeneracy in scene.title.split(", "))
+    found = drawn(draw_degenerate, 1000)
+    degeneracies = Counter(degeneracy for scene in found for degeneracy in scene.title.split(", "))
     assert min(degeneracies[name] for name, _ in STARTS) > 50
     assert min(degeneracies[name] for name, _, _ in DEGENERACIES) > 20
     assert {"loop", "pulse", "table", "sine", "absent", "no contact", "any horizon"} <= degeneracies.keys()
-    assert max(len(scene.title.split(", ")) for scene in drawn) > 5
+    assert max(len(scene.title.split(", ")) for scene in found) > 5
 
 
 @pytest.mark.slow
 @pytest.mark.thorough
 def test_a_wrong_run_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Scenes of the same kind at the coarsest accuracy."""
-    rng = np.random.default_rng(0)
     monkeypatch.setattr(properties, "Product", partial(Product, accuracy=1e-3))
-    found: list[Check] = []
-    for _ in range(60):
-        found += examine(inside(draw_ordinary, rng)).broken
-    assert {check.name for check in found} >= {"energy", "momentum, left", "position", "splitting"}
+    broken = {check.name for scene in drawn(draw_ordinary, 60) for check in examine(scene).broken}
+    assert broken >= {"energy", "momentum, left", "position", "splitting"}
 
 
 @pytest.mark.slow

@@ -14,7 +14,8 @@ from scipy.integrate import solve_ivp
 
 from grasp_ros.physics.model import Contact, impact_force, penetration
 from lab.cases.regression import load
-from lab.reference import integrate_scene
+from lab.oracles.closed_forms import impact
+from lab.reference import integrate
 
 FLAT = {"stiffness_N_per_m": 0.0, "damping_Ns_per_m": 0.0}
 CONTACT = {"hertz_N_per_m1_5": 1e4, "dissipation_s_per_m": 0.0}
@@ -37,7 +38,7 @@ def kinds(found: Any) -> list[tuple[int, str]]:
 def test_a_sliding_object_stops_where_the_closed_form_says() -> None:
     m, c, force, v = mpfr(2), mpfr(0.5), mpfr(0.25), mpfr(1.5)
     scene = made(20.0, object=body(2.0, 0.0, 1.5), object_friction={"viscous_Ns_per_m": 0.5, "coulomb_N": 0.25})
-    found = integrate_scene(scene, [0.0, 1.0, 20.0])
+    found = integrate(scene, [0.0, 1.0, 20.0])
     decay = gmpy2.exp(-c / m)
     assert close(found.state[1][3], (v + force / c) * decay - force / c)
     assert [event.kind for event in found.events] == ["stop"]
@@ -51,7 +52,7 @@ def test_an_object_that_a_force_pushes_back_turns_around() -> None:
         2.0, object=body(1.0, 0.0, 1.0), object_friction={"coulomb_N": 1.0},
         object_table={"time_s": [0.0], "force_N": [-3.0]},
     )
-    found = integrate_scene(scene, [2.0])  # -4 m/s^2 to the right, -2 m/s^2 to the left
+    found = integrate(scene, [2.0])  # -4 m/s^2 to the right, -2 m/s^2 to the left
     assert kinds(found) == [(2, "stop")]
     assert close(found.state[0][3], mpfr(-2) * mpfr("1.75"))
     assert close(found.state[0][2], mpfr("0.125") - mpfr("1.75") ** 2)
@@ -61,13 +62,11 @@ def test_a_stuck_object_is_a_wall_until_it_slips() -> None:
     """O1 beside a wall."""
     scene = made(1.0, left_arm=body(1.0, -0.5, 1.0), object=body(3.0), left_contact=CONTACT,
                     object_friction={"coulomb_N": 1000.0})
-    found = integrate_scene(scene, [1.0])
-    beta = gmpy2.gamma(mpfr("0.4")) * gmpy2.gamma(mpfr("0.5")) / gmpy2.gamma(mpfr("0.9"))
-    depth = gmpy2.root((mpfr(5) / 40000) ** 2, 5)
+    found = integrate(scene, [1.0])
     assert kinds(found) == [(0, "touch"), (0, "release")]
-    assert close(found.releases[0][0] - found.touches[0][0], mpfr("0.8") * beta * depth)
+    assert close(found.releases[0][0] - found.touches[0][0], str(impact(1, 1e4, 0, 1).duration))
     assert close(found.state[0][1], -1)
-    weak = integrate_scene(scene.changed({"object_friction.coulomb_N": 0.5}), [1.0])
+    weak = integrate(scene.changed({"object_friction.coulomb_N": 0.5}), [1.0])
     assert (2, "slip") in kinds(weak)
     assert weak.state[0][3] > 0
 
@@ -76,7 +75,7 @@ def test_a_stuck_object_slips_when_it_is_pushed_at_a_tick() -> None:
     """F = 1 N: 5 N for 0.4 s give 8 m/s^2, then friction takes 2 m/s^2."""
     scene = made(1.0, 0.1, left_arm=body(1.0, -1.0), object=body(0.5), left_contact=CONTACT,
                     object_friction={"coulomb_N": 1.0}, object_pulse={"force_N": 5.0, "start_s": 0.2, "length_s": 0.4})
-    found = integrate_scene(scene, [0.2, 0.6, 1.0])
+    found = integrate(scene, [0.2, 0.6, 1.0])
     assert [[float(number) for number in row[2:4]] for row in found.state] == [
         [0.0, 0.0], pytest.approx([0.64, 3.2]), pytest.approx([1.76, 2.4])]
     assert [(event.body, event.kind) for event in found.events] == [(2, "slip")]
@@ -84,7 +83,7 @@ def test_a_stuck_object_slips_when_it_is_pushed_at_a_tick() -> None:
 
 def test_forces_change_at_ticks() -> None:
     scene = made(1.0, 0.25, left_arm=body(2.0), left_arm_pulse={"force_N": 8.0, "start_s": 0.25, "length_s": 0.5})
-    found = integrate_scene(scene, [0.25, 0.5, 1.0])
+    found = integrate(scene, [0.25, 0.5, 1.0])
     assert [row[:2] for row in found.state] == [(0, 0), (mpfr("0.125"), 1), (1, 2)]
 
 
@@ -98,7 +97,7 @@ def test_a_sampled_arm_follows_its_recursion(delay: int) -> None:
         waiting.append(-5 * (x - mpfr("0.5")) - 2 * v)
         a = waiting.pop(0) / 4
         x, v = x + v * h + a * h * h / 2, v + a * h
-    found = integrate_scene(scene, [2.0])
+    found = integrate(scene, [2.0])
     assert close(found.state[0][0], x)
     assert close(found.state[0][1], v)
 
@@ -106,7 +105,7 @@ def test_a_sampled_arm_follows_its_recursion(delay: int) -> None:
 def test_what_falls_together_never_meets() -> None:
     scene = made(10.0, left_arm=body(1.0), object=body(0.5), left_contact=CONTACT,
                     tilt={"angle_rad": -0.5, "gravity_m_per_s2": 9.81})
-    found = integrate_scene(scene, [5.0, 10.0])
+    found = integrate(scene, [5.0, 10.0])
     assert found.events == []
     assert found.state[1][0] == found.state[1][2] > 100
 
@@ -115,7 +114,7 @@ def test_what_falls_together_never_meets() -> None:
 def test_the_first_derivative_that_differs_decides(push: float, together: bool) -> None:
     feedback = {"position_gain_N_per_m": 0.0, "velocity_gain_Ns_per_m": 0.0, "feed_forward_N": push}
     scene = made(0.5, left_arm=body(1.0, **FLAT), object=body(1.0), left_contact=CONTACT, left_feedback=feedback)
-    found = integrate_scene(scene, [0.5])
+    found = integrate(scene, [0.5])
     x, v, x_o, v_o = found.state[0][:4]
     assert close(v + v_o, mpfr(push) / 2)
     assert close(x + x_o, mpfr(push) / 8)
@@ -130,7 +129,7 @@ def test_the_first_derivative_that_differs_decides(push: float, together: bool) 
 def test_more_digits_change_nothing(name: str) -> None:
     scene = load(name)
     times = [scene.duration / 3, scene.duration]
-    few, many = integrate_scene(scene, times, digits=25), integrate_scene(scene, times, digits=35)
+    few, many = integrate(scene, times, digits=25), integrate(scene, times, digits=35)
     assert all(
         close(a, b, "1e-22") for left, right in zip(few.state, many.state, strict=True)
         for a, b in zip(left, right, strict=True)
@@ -156,11 +155,11 @@ def test_a_general_integrator_agrees(name: str) -> None:
         return np.ravel(np.column_stack([y[1::2], np.array(total) / bodies[[0, 2, 1], 0]]))
 
     general = solve_ivp(slope, (0.0, scene.duration), scene.initial_state, "LSODA", rtol=1e-12, atol=1e-15)
-    found = integrate_scene(scene, [scene.duration]).as_array()[0]
+    found = integrate(scene, [scene.duration]).as_array()[0]
     assert np.abs(general.y[:, -1] - found).max() < 1e-7 * np.abs(found).max()
 
 
 def test_a_budget_ends_a_run_where_it_is() -> None:
     scene = load("touching_chain")
-    found = integrate_scene(scene, [0.0, 1e-6, scene.duration], budget=100)
+    found = integrate(scene, [0.0, 1e-6, scene.duration], budget=100)
     assert len(found.state) == len(found.t) < 3

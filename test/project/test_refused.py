@@ -27,8 +27,7 @@ from lab.studies.records import Journal
 ROOT = Path(grasp_ros.__file__).parent
 LAB = ROOT.with_name("lab")
 OUR_OWN = (  # bare ValueErrors that no input of a user reaches
-    "lab/reference/plant.py", "lab/reference/solve.py", "lab/studies/certificate.py",
-    "grasp_ros/exact/compilation/kernel_cache.py",
+    "lab/studies/certificate.py", "grasp_ros/exact/compilation/kernel_cache.py",
 )
 
 

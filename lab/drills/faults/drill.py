@@ -30,52 +30,22 @@ CLOSE_SECONDS = 15.0  # for the end after a Ctrl-C, or behind `grasp run`
 
 
 class Drill(NamedTuple):
-    """A fault and how it is caused.
+    """A fault and how it is caused."""
 
-    Attributes
-    ----------
-    name : str
-        As `--only` takes it.
-    group, fault : str
-        For the reader.
-    start : callable
-        Starts the graph.
-    strike : callable
-        Causes the accident once the graph is at work; may take its time.
-    mute : bool
-        Whether nobody can read what is said from then on.
-    nothing_to_keep : bool
-        Whether the accident takes the bag away.
-    by_itself : bool
-        Whether the accident happens by itself, and so counts from when it is noticed.
-    settle : bool
-        Whether the graph is at work before the accident.
-    seen : Topic
-        By which ticks are counted, see `Stage`.
-    asked : bool
-        Whether it is no accident, but how a user ends a run.
-    quick : bool
-        Whether `--quick` plays it.
-    culprit : str
-        Whose name the last sentence has to have; empty: nobody's.
-    play : callable, optional
-        In place of the common course of a drill.
-    """
-
-    name: str
-    group: str
+    name: str  # as `--only` takes it
+    group: str  # for the reader, as the next
     fault: str
-    start: Callable[[Stage], object]
-    strike: Callable[[Stage], object]
-    mute: bool = False
-    nothing_to_keep: bool = False
-    by_itself: bool = False
-    settle: bool = True
-    seen: Topic = JOINT_STATES
-    asked: bool = False
-    quick: bool = False
-    culprit: str = ""
-    play: Callable[[Stage], Evidence] | None = None
+    start: Callable[[Stage], object]  # starts the graph
+    strike: Callable[[Stage], object]  # causes the accident once the graph is at work; may take its time
+    mute: bool = False  # nobody can read what is said from then on
+    nothing_to_keep: bool = False  # the accident takes the bag away
+    by_itself: bool = False  # the accident happens by itself, and so counts from when it is noticed
+    settle: bool = True  # the graph is at work before the accident
+    seen: Topic = JOINT_STATES  # by which ticks are counted, see `Stage`
+    asked: bool = False  # no accident, but how a user ends a run
+    quick: bool = False  # `--quick` plays it
+    culprit: str = ""  # whose name the last sentence has to have; empty: nobody's
+    play: Callable[[Stage], Evidence] | None = None  # in place of the common course of a drill
 
 
 class Skipped(Exception):  # noqa: N818 - no error

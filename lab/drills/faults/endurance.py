@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 
+import psutil
 from tqdm import tqdm
 
 from grasp_ros import scene as scenes
@@ -21,14 +22,7 @@ MEGABYTE = 2**20
 
 
 def run(name: str, ticks: int) -> bool:
-    """Print what a run of many ticks took; returns whether nothing was lost and memory was flat.
-
-    Parameters
-    ----------
-    name : str
-        Of a scene.
-    ticks : int
-    """
+    """Print what many ticks of a scene took; returns whether nothing was lost and memory was flat."""
     scene = scenes.load(name, [f"time.duration_s={ticks * scenes.load(name).period_ns / NANOSECONDS!r}"])
     companion = Companion()
     with tempfile.TemporaryDirectory() as directory:
@@ -54,24 +48,17 @@ def run(name: str, ticks: int) -> bool:
 def _watch(stage: Stage, ticks: int) -> tuple[dict[str, int], dict[str, int], float]:
     """Memory of the nodes in bytes, early and late, and the seconds from the first tick to the last."""
     stage.settle()
-    pids = {node: stage.pid(node) for node in NODES}
+    processes = {node: psutil.Process(stage.pid(node)) for node in NODES}
     begin, first = time.monotonic(), stage.published
     early: dict[str, int] = {}
-    late = {node: resident(pid) for node, pid in pids.items()}
+    late = dict.fromkeys(NODES, 0)
     with tqdm(total=ticks, unit="tick") as progress:
         while not stage.ended("grasp run") and (now := stage.published) < ticks:
             progress.update(now - progress.n)
-            late = {node: resident(pid) or late[node] for node, pid in pids.items()}
+            with suppress(psutil.NoSuchProcess):
+                late = {node: process.memory_info().rss or late[node] for node, process in processes.items()}
             if not early and 4 * now >= ticks:
                 early = dict(late)
             time.sleep(LOOK_SECONDS)
         progress.update(ticks - progress.n)
     return early or late, late, (time.monotonic() - begin) * ticks / max(ticks - first, 1)
-
-
-def resident(pid: int) -> int:
-    """Bytes of memory that a process holds; 0 if it has ended."""
-    try:
-        return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-    except OSError:
-        return 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
+from collections.abc import Callable
 from functools import partial
 from signal import Signals
 
@@ -38,17 +39,17 @@ def drills() -> list[Drill]:
     return [*found, *back, *_at_other_moments()]
 
 
-def _one(group: str, start: object, number: str, name: str) -> Drill:
+def _one(group: str, start: Callable[[Stage], None], number: str, name: str) -> Drill:
     words = f"{number} of {'`grasp run`' if name == 'grasp run' else 'the ' + name.replace('_', ' ')}"
     key = f"{number}-{name.split()[0]}" + ("" if group == UNDER else "-alone")
     if number == "SIGSTOP":
         words += f", SIGCONT after {FROZEN_SECONDS:g} s"
-    strike = partial(freeze, name=name) if number == "SIGSTOP" else partial(send, name=name, number=Signals[number])
+    kill = partial(Stage.signal, name=name, number=Signals[number])
+    strike = partial(freeze, name=name) if number == "SIGSTOP" else kill
     asked = name == "grasp run" and number in ASKING
     seen = LYAPUNOV if name == "monitor" else JOINT_STATES
     culprit = "" if name == "grasp run" or group == PATIENT else name
-    return Drill(key, group, words, start, strike, seen=seen, asked=asked, quick=key in QUICK,  # type: ignore[arg-type]
-                 culprit=culprit)
+    return Drill(key, group, words, start, strike, seen=seen, asked=asked, quick=key in QUICK, culprit=culprit)
 
 
 def replace(stage: Stage, name: str) -> None:
@@ -59,11 +60,6 @@ def replace(stage: Stage, name: str) -> None:
     stage.node(name)
     reached = stage.published
     stage.wait(lambda: stage.published > reached, 20.0)
-
-
-def send(stage: Stage, name: str, number: Signals) -> None:
-    """Send a signal."""
-    stage.signal(name, number)
 
 
 def freeze(stage: Stage, name: str, seconds: float = FROZEN_SECONDS) -> None:
@@ -94,59 +90,47 @@ def suspend(stage: Stage) -> None:
 
 
 def _at_other_moments() -> list[Drill]:
-    group = "at other moments"
+    group, one_process = "at other moments", _run_with("--one-process")
     return [
         Drill("freeze-a-moment", group, f"SIGSTOP of each node in turn, SIGCONT after {MOMENT_SECONDS:g} s", Stage.run,
               freeze_all),
         Drill("suspend", group, f"SIGSTOP of all processes at once, SIGCONT after {FROZEN_SECONDS:g} s", Stage.run,
               suspend),
-        Drill("kill-while-paused", group, "SIGKILL of the left controller of a paused graph", _paused, _while_paused,
-              settle=False),
+        Drill("kill-while-paused", group, "SIGKILL of the left controller of a paused graph",
+              _run_with("--paused"), _while_paused, settle=False),
         Drill("kill-while-starting", group, "SIGKILL of the left controller while it starts", Stage.run,
               partial(_while_starting, name="left_controller"), settle=False, nothing_to_keep=True),
         Drill("kill-monitor-while-starting", group, "SIGKILL of the monitor while it starts", Stage.run,
               partial(_while_starting, name="monitor"), settle=False, nothing_to_keep=True),
         Drill("kill-run-while-starting", group, "SIGKILL of `grasp run` while its nodes start", Stage.run,
-              _run_while_starting, settle=False, nothing_to_keep=True),
+              partial(_while_starting, name="grasp run", with_node="monitor"), settle=False, nothing_to_keep=True),
         Drill("kill-free-controller", group, "SIGKILL of the left controller of a free-running graph",
-              _free_running, partial(send, name="left_controller", number=signal.SIGKILL)),
-        Drill("kill-one-process", group, "SIGKILL of the one process of `--one-process`", _one_process,
-              partial(send, name="graph", number=signal.SIGKILL), seen=LYAPUNOV),
+              _run_with("--free-running"), partial(Stage.signal, name="left_controller", number=signal.SIGKILL)),
+        Drill("kill-one-process", group, "SIGKILL of the one process of `--one-process`", one_process,
+              partial(Stage.signal, name="graph", number=signal.SIGKILL), seen=LYAPUNOV),
         Drill("freeze-one-process", group, f"SIGSTOP of the one process of `--one-process`, SIGCONT after"
-              f" {FROZEN_SECONDS:g} s", _one_process, partial(freeze, name="graph"), seen=LYAPUNOV),
-        Drill("kill-run-of-one-process", group, "SIGKILL of `grasp run --one-process`", _one_process,
-              partial(send, name="grasp run", number=signal.SIGKILL)),
+              f" {FROZEN_SECONDS:g} s", one_process, partial(freeze, name="graph"), seen=LYAPUNOV),
+        Drill("kill-run-of-one-process", group, "SIGKILL of `grasp run --one-process`", one_process,
+              partial(Stage.signal, name="grasp run", number=signal.SIGKILL)),
         Drill("ctrl-c-twice", group, "Ctrl-C, and another one while it ends", Stage.run, _twice,
               asked=True),
     ]
 
 
-def _while_starting(stage: Stage, name: str) -> None:
-    stage.wait(lambda: stage.has(name), 60.0)
+def _run_with(word: str) -> Callable[[Stage], None]:
+    return lambda stage: stage.run(word)
+
+
+def _while_starting(stage: Stage, name: str, with_node: str = "") -> None:
+    """Kill it, or rather once a node is there."""
+    stage.wait(lambda: stage.has(with_node or name), 60.0)
     stage.signal(name, signal.SIGKILL)
-
-
-def _run_while_starting(stage: Stage) -> None:
-    stage.wait(lambda: stage.has("monitor"), 60.0)
-    stage.signal("grasp run", signal.SIGKILL)
-
-
-def _paused(stage: Stage) -> None:
-    stage.run("--paused")
 
 
 def _while_paused(stage: Stage) -> None:
     stage.wait(lambda: stage.published >= 0, 60.0)
     time.sleep(MOMENT_SECONDS)
     stage.signal("left_controller", signal.SIGKILL)
-
-
-def _one_process(stage: Stage) -> None:
-    stage.run("--one-process")
-
-
-def _free_running(stage: Stage) -> None:
-    stage.run("--free-running")
 
 
 def _twice(stage: Stage) -> None:

@@ -10,11 +10,13 @@ import subprocess
 import sys
 import time
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
@@ -105,9 +107,9 @@ class Stage:
         self.started[name] = process
         return process
 
-    def run_words(self, *words: str) -> list[str]:
-        """`grasp run` of the scene."""
-        return [*GRASP, "run", str(self._scene_file), "-o", str(self.place / "run"), *words]
+    def run_words(self, *words: str, place: str = "run") -> list[str]:
+        """`grasp run` of the scene, which writes to a place in the directory."""
+        return [*GRASP, "run", str(self._scene_file), "-o", str(self.place / place), *words]
 
     def run(self, *words: str) -> None:
         """Start `grasp run`."""
@@ -130,10 +132,10 @@ class Stage:
         """Process of a node, or of `grasp run`."""
         if name in self.started:
             return self.started[name].pid
-        for pid in self.living():
-            words = _words(pid)
-            if "grasp_ros.graph" in words and name in words:
-                return pid
+        for process in self._processes():
+            with suppress(psutil.NoSuchProcess):
+                if {"grasp_ros.graph", name} <= set(process.cmdline()):
+                    return int(process.pid)
         raise Failed(f"{name} does not run")
 
     def has(self, name: str) -> bool:
@@ -162,18 +164,14 @@ class Stage:
         if math.isnan(self.accident):
             self.accident = time.monotonic() if when is None else when
 
+    def _processes(self) -> Iterator[psutil.Process]:
+        for process in psutil.process_iter(["environ"]):
+            if (process.info["environ"] or {}).get(MARK) == self.mark:  # None: somebody else's
+                yield process
+
     def living(self) -> list[int]:
         """Processes of this drill that live, whoever is their parent."""
-        mark = f"{MARK}={self.mark}".encode()
-        found = []
-        for entry in Path("/proc").iterdir():
-            try:
-                if (entry.name.isdecimal() and mark in (entry / "environ").read_bytes()
-                        and (entry / "stat").read_text().rpartition(")")[2].split()[0] != "Z"):
-                    found.append(int(entry.name))
-            except OSError:  # gone, or somebody else's
-                continue
-        return found
+        return [process.pid for process in self._processes()]
 
     @property
     def published(self) -> int:
@@ -213,7 +211,8 @@ class Stage:
 
     def shared_memory(self) -> set[str]:
         """Files in /dev/shm that processes of this drill have opened, and the stranger has not."""
-        return {name for pid in self.living() for name in _shared(pid)} - _shared(self.companion.pid)
+        own = {name for process in self._processes() for name in _shared(process)}
+        return own - _shared(psutil.Process(self.companion.pid))
 
     def clear(self) -> None:
         """Kill what is left of this drill, and remove its files."""
@@ -232,16 +231,7 @@ class Stage:
         shutil.rmtree(self.place, ignore_errors=True)
 
 
-def _words(pid: int) -> list[str]:
-    try:
-        return Path(f"/proc/{pid}/cmdline").read_text().split("\0")
-    except OSError:
-        return []
-
-
-def _shared(pid: int) -> set[str]:
-    try:
-        maps = Path(f"/proc/{pid}/maps").read_text()
-    except OSError:
-        return set()
-    return {word for line in maps.splitlines() if (word := line.split()[-1]).startswith("/dev/shm/")}
+def _shared(process: psutil.Process) -> set[str]:
+    with suppress(psutil.NoSuchProcess):
+        return {part.path for part in process.memory_maps() if part.path.startswith("/dev/shm/")}
+    return set()

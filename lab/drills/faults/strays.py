@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -24,32 +25,28 @@ def drills() -> list[Drill]:
 
 def _strays() -> list[Drill]:
     """Somebody sends a message, once or for a while, and is gone again."""
-    command = partial(_stray, topic=LEFT_COMMAND)
+    def stray(name: str, fault: str, topic: Topic, fields: dict[str, Any], seconds: float = 0.0, quick: bool = False
+              ) -> Drill:
+        send = partial(_stray, topic=topic, fields=fields, seconds=seconds)
+        return Drill(name, STRAY, fault, Stage.run, send, quick=quick)
+
+    push, parameters = {"wrench.force.x": 1.0}, Topic("left/parameters", NAMED_LIST, latched=True)
     return [
-        Drill("wall-clock", STRAY, "one command stamped with the wall clock", Stage.run,
-              partial(command, fields={"stamp": "wall", "wrench.force.x": 1.0}), quick=True),
-        Drill("command", STRAY, "one command stamped with the latest state, 1e6 N", Stage.run,
-              partial(command, fields={"wrench.force.x": 1e6})),
-        Drill("frame-number", STRAY, "one command whose frame_id is 7", Stage.run,
-              partial(command, fields={"header.frame_id": "7", "wrench.force.x": 1.0})),
-        Drill("frame-world", STRAY, "one command whose frame_id is world", Stage.run,
-              partial(command, fields={"header.frame_id": "world", "wrench.force.x": 1.0})),
-        Drill("flood", STRAY, "commands at full speed for 2 s", Stage.run,
-              partial(command, fields={"wrench.force.x": 1.0}, seconds=2.0)),
-        Drill("malformed-state", STRAY, "one malformed joint_states", Stage.run,
-              partial(_stray, topic=JOINT_STATES, fields=MALFORMED)),
-        Drill("malformed-lyapunov", STRAY, "one malformed lyapunov", Stage.run,
-              partial(_stray, topic=LYAPUNOV, fields=MALFORMED)),
-        Drill("malformed-parameters", STRAY, "one malformed left/parameters", Stage.run,
-              partial(_stray, topic=Topic("left/parameters", NAMED_LIST, latched=True), fields=MALFORMED)),
-        Drill("stray-scene", STRAY, "a scene with a tag of Python", Stage.run,
-              partial(_stray, topic=SCENE, fields={"data": CODE})),
-        Drill("stray-run", STRAY, "a text of another kind on run", Stage.run,
-              partial(_stray, topic=RUN, fields={"data": CODE})),
+        stray("wall-clock", "one command stamped with the wall clock", LEFT_COMMAND, {"stamp": "wall", **push},
+              quick=True),
+        stray("command", "one command stamped with the latest state, 1e6 N", LEFT_COMMAND, {"wrench.force.x": 1e6}),
+        stray("frame-number", "one command whose frame_id is 7", LEFT_COMMAND, {"header.frame_id": "7", **push}),
+        stray("frame-world", "one command whose frame_id is world", LEFT_COMMAND, {"header.frame_id": "world", **push}),
+        stray("flood", "commands at full speed for 2 s", LEFT_COMMAND, push, seconds=2.0),
+        stray("malformed-state", "one malformed joint_states", JOINT_STATES, MALFORMED),
+        stray("malformed-lyapunov", "one malformed lyapunov", LYAPUNOV, MALFORMED),
+        stray("malformed-parameters", "one malformed left/parameters", parameters, MALFORMED),
+        stray("stray-scene", "a scene with a tag of Python", SCENE, {"data": CODE}),
+        stray("stray-run", "a text of another kind on run", RUN, {"data": CODE}),
         Drill("stray-scene-alone", STRAY, "a scene with a tag of Python, before the plant is there", _without_plant,
               _scene_before, settle=False, nothing_to_keep=True),
-        Drill("stray-contact", STRAY, "contact forces stamped with the wall clock, at full speed for 2 s", Stage.run,
-              partial(_stray, topic=Topic("contact/left", FORCE), fields={"stamp": "wall"}, seconds=2.0)),
+        stray("stray-contact", "contact forces stamped with the wall clock, at full speed for 2 s",
+              Topic("contact/left", FORCE), {"stamp": "wall"}, seconds=2.0),
     ]
 
 
@@ -95,11 +92,12 @@ def _go_wrong(stage: Stage, **fields: Any) -> None:
 
 
 def _others() -> list[Drill]:
+    other = ("-p", "left_feedback.position_gain_N_per_m:=9.0", "-r", "__node:=other")
     return [
         Drill("second-controller", OTHERS, "a second left controller, with another gain", Stage.run,
-              partial(_second, words=["-r", "__node:=other"],
-                      numbers={"left_feedback.position_gain_N_per_m": "9.0"})),
-        Drill("second-plant", OTHERS, "a second plant", Stage.run, partial(_second, name="plant"), by_itself=True),
+              partial(_second, name="left_controller", topic=LEFT_COMMAND, words=other)),
+        Drill("second-plant", OTHERS, "a second plant", Stage.run, partial(_second, name="plant", topic=JOINT_STATES),
+              by_itself=True),
         Drill("second-run", OTHERS, "a second `grasp run`", Stage.run, _second_run, by_itself=True),
         Drill("frozen-reader", OTHERS, "a subscriber that is frozen", _with_reader, _freeze_reader),
         Drill("other-scene", OTHERS, "the plant is killed, and one with another scene is started", Stage.terminals,
@@ -107,24 +105,16 @@ def _others() -> list[Drill]:
     ]
 
 
-def _second(stage: Stage, name: str = "left_controller", words: Any = (), numbers: Any = None) -> None:
-    numbers = numbers or {}
-    options = [word for key, value in numbers.items() for word in ("-p", f"{key}:={value}")]
-    stage.start(f"second {name}", [*NODE, name, "--ros-args", *options, *words])
-    _when_there(stage, LEFT_COMMAND if name == "left_controller" else JOINT_STATES)
+def _second(stage: Stage, name: str, topic: Topic, words: Sequence[str] = ()) -> None:
+    """The accident happens when its topic has two sources."""
+    stage.start(f"second {name}", [*NODE, name, "--ros-args", *words])
+    stage.happens(stage.companion.ask("wait_for_sources", topic=topic.name, number=2)["when"])
 
 
 def _second_run(stage: Stage) -> None:
-    words = stage.run_words()
-    words[words.index("-o") + 1] = str(stage.place / "second")
-    stage.start("second run", words)
+    stage.start("second run", stage.run_words(place="second"))
     stage.wait(lambda: stage.ended("second run"), 20.0)
     stage.happens()
-
-
-def _when_there(stage: Stage, topic: Topic) -> None:
-    """The accident happens when a topic has two sources."""
-    stage.happens(stage.companion.ask("wait_for_sources", topic=topic.name, number=2)["when"])
 
 
 def _with_reader(stage: Stage) -> None:

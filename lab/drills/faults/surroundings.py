@@ -7,10 +7,11 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import psutil
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
@@ -30,8 +31,8 @@ CUTS, FILE_COUNT = 40, 200
 def drills() -> list[Drill]:
     """All of them."""
     return [
-        Drill("closed-terminal", GROUP, "its terminal is closed", _in_terminal, _close_terminal, mute=True),
-        Drill("closed-pipe", GROUP, "nobody reads its output any more", _in_pipe, _close_pipe, mute=True),
+        Drill("closed-terminal", GROUP, "its terminal is closed", _in_terminal, _close_output, mute=True),
+        Drill("closed-pipe", GROUP, "nobody reads its output any more", _in_pipe, _close_output, mute=True),
         Drill("full-disk", GROUP, "the disk becomes full", _on_small_disk, _until_the_end, by_itself=True),
         Drill("file-limit", GROUP, "a limit of the file size (`ulimit -f`)", _with_limit, _until_the_end,
               by_itself=True),
@@ -49,8 +50,8 @@ def drills() -> list[Drill]:
     ]
 
 
-def _own(name: str, group: str, fault: str, course: object) -> Drill:
-    return Drill(name, group, fault, _nothing, _nothing, play=course)  # type: ignore[arg-type]
+def _own(name: str, group: str, fault: str, play: Callable[[Stage], Evidence]) -> Drill:
+    return Drill(name, group, fault, _nothing, _nothing, play=play)
 
 
 def _nothing(_: Stage) -> None:
@@ -66,10 +67,6 @@ def _in_terminal(stage: Stage) -> None:
     stage.output.follow(master)
 
 
-def _close_terminal(stage: Stage) -> None:
-    stage.output.leave(stage.terminal)
-
-
 def _in_pipe(stage: Stage) -> None:
     stage.terminal, end = os.pipe()
     stage.start("grasp run", stage.run_words(), stdout=end, stderr=end)
@@ -77,7 +74,7 @@ def _in_pipe(stage: Stage) -> None:
     stage.output.follow(stage.terminal)
 
 
-def _close_pipe(stage: Stage) -> None:
+def _close_output(stage: Stage) -> None:
     stage.output.leave(stage.terminal)
 
 
@@ -86,12 +83,10 @@ def _on_small_disk(stage: Stage) -> None:
         raise Skipped("no file system may be mounted here")
     disk = stage.place / "disk"
     disk.mkdir()
-    words = stage.run_words()
-    words[words.index("-o") + 1] = str(disk / "run")
     script = ('mount -t tmpfs -o size="$0" none "$1" && target="$1" && copy="$2" && shift 2 && trap : INT && "$@";'
               ' status=$?; cp -r "$target/run" "$copy"; exit $status')
     given = [script, str(DISK_BYTES), str(disk), str(stage.place)]
-    stage.start("grasp run", ["unshare", "-rm", "sh", "-c", *given, *words])
+    stage.start("grasp run", ["unshare", "-rm", "sh", "-c", *given, *stage.run_words(place="disk/run")])
 
 
 def _with_limit(stage: Stage) -> None:
@@ -133,23 +128,12 @@ def _shared_memory(stage: Stage) -> Evidence:
 def _idle(stage: Stage) -> Evidence:
     stage.node("plant")
     stage.wait(lambda: stage.said("waiting"), 60.0)
-    share = _share(stage.pid("plant"))
+    share = psutil.Process(stage.pid("plant")).cpu_percent(IDLE_SECONDS) / 100.0
     stage.signal("plant", signal.SIGINT)
     stage.wait(lambda: stage.ended("plant"), 15.0)
     said = f"{100.0 * share:.0f} % of a core" if share > IDLE_SHARE else f"at most {100.0 * IDLE_SHARE:.0f} % of a core"
     return Evidence(said=said, went_on=True, exits={"plant": stage.started["plant"].returncode}, nothing_to_keep=True,
                     wrong=said if share > IDLE_SHARE else "", left=len(stage.living()))
-
-
-def _share(pid: int) -> float:
-    """Share of a core that a process takes."""
-    def used() -> float:
-        user, system = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13]
-        return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
-
-    before, begin = used(), time.monotonic()
-    time.sleep(IDLE_SECONDS)
-    return (used() - before) / (time.monotonic() - begin)
 
 
 def _remapped(stage: Stage) -> Evidence:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -33,50 +34,23 @@ class Verdict(Enum):
 
 @dataclass
 class Evidence:
-    """What is known of a drill once it is over.
+    """What is known of a drill once it is over."""
 
-    Attributes
-    ----------
-    said : str
-        The last sentence that a user sees; empty: none.
-    noticed : float, s
-        From the accident to the first sentence or report; NaN: never.
-    exits : dict of str to int
-        Exit statuses by process.
-    lost : float, s
-        Wall time before the accident from which nothing is in the bag.
-    went_on, hung : bool
-    left, shared : int
-        Processes, and files in /dev/shm, that are still there.
-    blames_another : bool
-        Whether the last sentence does not name the process that was hit.
-    traceback : str
-        Its last line.
-    wrong : str
-        Why what the bag holds is not the run.
-    mute : bool
-        Whether nobody could read a sentence: the terminal is gone.
-    asked : bool
-        Whether a user has ended the run: that takes as long as it takes to close it.
-    nothing_to_keep : bool
-        Whether the bag itself was taken away, or there was none.
-    """
-
-    said: str = ""
-    noticed: float = float("nan")
-    exits: dict[str, int] = field(default_factory=dict)
-    lost: float = 0.0
+    said: str = ""  # the last sentence that a user sees; empty: none
+    noticed: float = math.nan  # s, from the accident to the first sentence or report; NaN: never
+    exits: dict[str, int] = field(default_factory=dict)  # exit statuses by process
+    lost: float = 0.0  # s of wall time before the accident from which nothing is in the bag
     went_on: bool = False
     hung: bool = False
-    left: int = 0
-    shared: int = 0
-    blames_another: bool = False
-    traceback: str = ""
-    wrong: str = ""
-    mute: bool = False
-    asked: bool = False
-    nothing_to_keep: bool = False
-    skipped: str = ""
+    left: int = 0  # processes that are still there
+    shared: int = 0  # files in /dev/shm that are still there
+    blames_another: bool = False  # the last sentence does not name the process that was hit
+    traceback: str = ""  # its last line
+    wrong: str = ""  # why what the bag holds is not the run
+    mute: bool = False  # nobody could read a sentence: the terminal is gone
+    asked: bool = False  # a user has ended the run: that takes as long as it takes to close it
+    nothing_to_keep: bool = False  # the bag itself was taken away, or there was none
+    skipped: str = ""  # why the drill cannot be played here
 
     @property
     def verdict(self) -> Verdict:

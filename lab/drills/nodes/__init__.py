@@ -1,4 +1,4 @@
-"""Nodes that only the laboratory starts: the baseline without physics, a caller of services, an injector of faults."""
+"""Nodes that only the laboratory starts: the baseline without physics, an injector of faults."""
 
 from __future__ import annotations
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import json
 import math
-import queue
+import select
 import sys
-import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -94,10 +94,8 @@ class Stranger:
 
     def wait_for_sources(self, topic: str, number: int, seconds: float = MATCH_SECONDS) -> dict[str, Any]:
         """Wait until a topic has that many publishers; says when it had, and how many there are."""
-        deadline = time.monotonic() + seconds
-        while (there := self._node.count_publishers(topic)) < number and time.monotonic() < deadline:
-            self.spin()
-        return {"when": time.monotonic(), "there": there}
+        self._wait(lambda: self._node.count_publishers(topic) >= number, seconds)
+        return {"when": time.monotonic(), "there": self._node.count_publishers(topic)}
 
     def publish(self, topic: str, type: str, fields: dict[str, Any], seconds: float = 0.0) -> dict[str, Any]:
         """Send a message once its readers are there, once or at full speed for some seconds; then stop to be a source.
@@ -105,7 +103,7 @@ class Stranger:
         Fields are named by their paths; `stamp` is in ns, or WALL.
         """
         publisher = self._node.create_publisher(messages.TYPES[type], topic, messages.qos(Topic(topic, type)))
-        self._wait(publisher, 1)
+        self._wait(lambda: publisher.get_subscription_count() > 0)
         message = filled(messages.TYPES[type](), {"stamp": self._latest_ns, **fields})
         begin, sent = time.monotonic(), 0
         while not sent or time.monotonic() < begin + seconds:
@@ -115,9 +113,9 @@ class Stranger:
         self._node.destroy_publisher(publisher)
         return {"begin": begin, "sent": sent}
 
-    def _wait(self, publisher: Any, readers: int) -> None:
-        deadline = time.monotonic() + MATCH_SECONDS
-        while publisher.get_subscription_count() < readers and time.monotonic() < deadline:
+    def _wait(self, condition: Callable[[], bool], seconds: float = MATCH_SECONDS) -> None:
+        deadline = time.monotonic() + seconds
+        while not condition() and time.monotonic() < deadline:
             self.spin()
 
     def control(self, side: str, force: float | None = None, **fields: Any) -> dict[str, Any]:
@@ -130,7 +128,7 @@ class Stranger:
             topic = COMMANDS[side]
             self._node.create_subscription(JointState, JOINT_STATES.name, self._control, messages.qos(JOINT_STATES))
             self._commands = self._node.create_publisher(messages.TYPES[topic.type], topic.name, messages.qos(topic))
-            self._wait(self._commands, 2)  # plant and monitor
+            self._wait(lambda: self._commands.get_subscription_count() > 1)  # plant and monitor
         return {}
 
     def _control(self, state: JointState) -> None:
@@ -161,17 +159,12 @@ def filled(message: Any, fields: dict[str, Any]) -> Any:
 
 def main() -> None:
     """Do what the lines say until there are no more."""
-    lines: queue.Queue[str] = queue.Queue()
-    threading.Thread(target=_read, args=(lines,), daemon=True).start()
     stranger: Stranger | None = None
     while True:
-        try:
-            line = lines.get(timeout=0.0 if stranger else None)
-        except queue.Empty:
-            assert stranger is not None
+        if stranger is not None and not select.select([sys.stdin], [], [], 0.0)[0]:
             stranger.spin()
             continue
-        if not line:
+        if not (line := sys.stdin.readline()):  # nobody asks again before the answer, so that none waits in its buffer
             break
         words = json.loads(line)
         action, answer = words.pop("do"), {}
@@ -185,12 +178,6 @@ def main() -> None:
         print(json.dumps(answer), flush=True)
     if stranger is not None:
         stranger.close()
-
-
-def _read(lines: queue.Queue[str]) -> None:
-    for line in sys.stdin:
-        lines.put(line)
-    lines.put("")
 
 
 if __name__ == "__main__":
