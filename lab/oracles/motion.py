@@ -169,8 +169,7 @@ def _bodies(detail: Detail, pairs: list[Impacts], own: tuple[Array, Array, Array
 def _positions(detail: Detail, size: Sizes, noise: Array, smooth: NDArray[np.bool_], present: list[int]) -> Ledger:
     """dx = int v dt, the worst of all bodies.
 
-    The impact forces of a contact at rest may balance; `noise` (k, 3) is what their roundings make of v. An implicit
-    step, whose nodes depend on each other, has it from its begin on.
+    The impact forces of a contact at rest may balance; `noise` (k, 3) is what their roundings make of v.
     """
     way, doubt = detail.integral(detail.v)
     late = EPS * detail.pieces.end[:, None]
