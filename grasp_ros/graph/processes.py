@@ -36,8 +36,11 @@ NO_MEMORY = " (is /dev/shm full?)"
 
 
 def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> NoReturn:
-    """Become the process of a node, with parameters as `-p` takes them: signals and exit status are the node's own."""
-    os.execv(sys.executable, _command([node], parameters, namespace))
+    """Become the process of a node, with parameters as `-p` takes them: signals and exit status are the node's own.
+
+    It keeps no log file, which would need a home directory that can be written.
+    """
+    os.execv(sys.executable, [*_command([node], parameters, namespace), "--disable-external-lib-logs"])
 
 
 def _command(nodes: Sequence[str], parameters: Mapping[str, str], namespace: str) -> list[str]:
