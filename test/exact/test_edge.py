@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exact.bench import bench
+from exact.bench import SIDES, bench
 from mpmath import mp, mpf
 from oracles import FREE, flight
 
@@ -23,16 +23,14 @@ from grasp_ros.exact.automaton.edge import (
     separates,
     surface_side,
 )
-from grasp_ros.exact.automaton.modes import let_leave, make_transition
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.kinematics import difference, other
 from grasp_ros.exact.records import Deciding, Plant, State
 from grasp_ros.exact.tolerances import DERIVATIVE, SURFACE
-from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Of, Pair, Slide, Transition, U, Work, X
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Of, Pair, Slide, U, Work, X
 from grasp_ros.physics.model import Contact
 from lab.reference.grasp import Grasp, system_of
 
-SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
 Row = tuple[float, float, float, float]  # m, k, c, f
 # An arm and an object whose derivatives below an order agree; their place and velocity.
 PARTING: dict[int, tuple[Row, Row, float, float]] = {
@@ -364,15 +362,6 @@ def test_a_feedback_that_drives_makes_no_time_longer() -> None:
 
 
 @SIDES
-@pytest.mark.parametrize("mode", list(Pair))
-def test_only_a_pair_that_leaves_is_turned_back(side: Body, mode: Pair) -> None:
-    b = bench(side, 0.0, 0.3, Pair.OPEN, beside=(0.01, -2.0), beside_mode=mode)
-    make_transition(b.plant, b.state, side, Transition.TOUCH, False, b.out)
-    assert b.mode(side) is Pair.CONTACT
-    assert b.mode(other(side)) is (Pair.CONTACT if mode is Pair.LEAVING else mode)
-
-
-@SIDES
 @pytest.mark.parametrize(("u", "d", "options", "expected"), [
     (0.01, -1.0, {}, True), (0.0, -1.0, {}, True), (0.01, 1.0, {"push": 9.0}, False), (0.01, 0.0, {}, False),
     (0.01, -1.0, {"push": 4.9}, True), (0.01, -1.0, {"push": 5.1}, False),  # 20 u |u''| beside u'^2
@@ -457,24 +446,6 @@ def test_beyond_the_third_derivative_only_bodies_without_an_impact_beside_are_kn
 def test_a_pair_has_glided_at_the_surface_alone(side: Body, d: float, options: dict[str, Any], expected: bool) -> None:
     b = bench(side, 0.01, d, Pair.CONTACT, **options)
     assert bool(has_glided(b.plant, b.state, side, SURFACE)) is expected
-
-
-@SIDES
-@pytest.mark.parametrize(("d", "options", "expected"), [
-    (-2.0, {}, Pair.LEAVING), (-1.0, {}, Pair.CONTACT), (-2.0, {"push": 1.0}, Pair.CONTACT)])
-def test_a_pair_in_contact_leaves_where_nothing_moves_it(side: Body, d: float, options: dict[str, Any], expected: Pair
-                                                         ) -> None:
-    b = bench(side, 0.01, d, Pair.CONTACT, **options)
-    let_leave(b.plant, b.state, b.settings)
-    assert (b.mode(side), b.mode(other(side)), b.events) == (expected, Pair.OPEN, [])
-
-
-@SIDES
-@pytest.mark.parametrize("mode", [mode for mode in Pair if mode not in (Pair.CONTACT, Pair.LEAVING)])
-def test_only_a_pair_in_contact_leaves(side: Body, mode: Pair) -> None:
-    b = bench(side, 0.01, -2.0, mode)
-    let_leave(b.plant, b.state, b.settings)
-    assert b.mode(side) is mode
 
 
 @pytest.mark.parametrize(("p", "masses", "state"), [

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from documents import body, made
-from exact.bench import bench
+from exact.bench import SIDES, bench
 
 from grasp_ros import scene
 from grasp_ros.exact.driver.energy_check import check_segment, energy_level
@@ -18,7 +18,6 @@ from grasp_ros.physics.layout import EPS, LEFT, RIGHT, Body, Law, Of, Outcome, P
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.simulation import simulate
 
-SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
 OPEN = (Pair.OPEN, Pair.OPEN)
 GRAZE = (0.6, 0.01)  # m/s, s: a body that comes so fast from so far and just reaches the other one
 

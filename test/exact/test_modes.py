@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exact.bench import TOLERANCE, Bench, bench, bits
+from exact.bench import SIDES, TOLERANCE, Bench, bench, bits
 
 from grasp_ros.exact.automaton.friction import apply_friction, since_certain
 from grasp_ros.exact.automaton.modes import (
@@ -33,7 +33,6 @@ from grasp_ros.exact.records import Candidate, Ends, Tables
 from grasp_ros.exact.tolerances import LEFT_OUT
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, Slide, Transition, U, V, X
 
-SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
 NEVER = Candidate(math.inf, Transition.TOUCH)
 NO_SLIDE = Candidate(math.inf, Slide.FREE)
 
@@ -106,15 +105,15 @@ def test_a_pair_that_something_moves_clamps(side: Body, options: dict[str, float
 
 
 @SIDES
-@pytest.mark.parametrize(
-    ("kind", "beside_mode", "after"),
-    [(Transition.TOUCH, Pair.LEAVING, Pair.CONTACT), (Transition.TOUCH, Pair.CLAMPED, Pair.CLAMPED),
-     (Transition.RELEASE, Pair.LEAVING, Pair.LEAVING)],
-)
-def test_a_touch_turns_back_a_pair_that_leaves(side: Body, kind: Transition, beside_mode: Pair, after: Pair) -> None:
-    b = bench(side, 0.0, 0.3, beside=(0.01, -2.0), beside_mode=beside_mode)
+@pytest.mark.parametrize(("kind", "mode"), [
+    *((Transition.TOUCH, mode) for mode in Pair), (Transition.RELEASE, Pair.LEAVING),
+])
+def test_only_a_touch_turns_back_a_pair_and_only_one_that_leaves(side: Body, kind: Transition, mode: Pair) -> None:
+    b = bench(side, 0.0, 0.3, beside=(0.01, -2.0), beside_mode=mode)
     make_transition(b.plant, b.state, side, kind, False, b.out)
-    assert (b.mode(other(side)), b.events) == (after, [(side, kind)])
+    turned = kind is Transition.TOUCH and mode is Pair.LEAVING
+    assert b.mode(other(side)) is (Pair.CONTACT if turned else mode)
+    assert b.events == [(side, kind)]
 
 
 @SIDES
@@ -310,32 +309,23 @@ def test_a_pair_at_rest_on_a_stuck_object_feels_its_own_arm_alone(side: Body) ->
 
 
 @SIDES
-def test_initial_modes_of_a_chain(side: Body) -> None:
-    """A pair at rest at u = 0 on which nothing acts follows the other one, whichever side is judged first."""
-    for rate, beside, expected in (
-        (0.4, Pair.CONTACT, Pair.CONTACT), (-0.4, Pair.OPEN, Pair.RESTING), (0.0, Pair.RESTING, Pair.RESTING)
-    ):
-        b = bench(side, 0.0, 0.0, beside=(0.0, rate))
-        initial_modes(b.plant, b.state)
-        assert (b.mode(side), b.mode(other(side))) == (expected, beside)
-
-
-@SIDES
-def test_initial_modes_of_a_pair_that_is_pressed_against_a_resting_one(side: Body) -> None:
-    b = bench(side, 0.0, 0.0, beside=(0.0, 0.0), push=1.0)
+@pytest.mark.parametrize(("own", "beside", "push", "expected"), [
+    ((0.0, 0.0), (0.0, 0.4), 0.0, (Pair.CONTACT, Pair.CONTACT)),  # at rest it follows the other one
+    ((0.0, 0.0), (0.0, -0.4), 0.0, (Pair.RESTING, Pair.OPEN)),
+    ((0.0, 0.0), (0.0, 0.0), 0.0, (Pair.RESTING, Pair.RESTING)),
+    ((0.0, 0.0), (0.0, 0.0), 1.0, (Pair.CONTACT, Pair.CONTACT)),
+    ((0.0, 0.0), (0.0, 0.0), -1.0, (Pair.OPEN, Pair.RESTING)),
+    ((-0.1, 0.0), (0.05, 0.2), 0.0, (Pair.OPEN, Pair.CONTACT)),
+    ((0.1, 0.0), (0.05, 0.2), 0.0, (Pair.CONTACT, Pair.CONTACT)),
+    ((0.1, -9.0), (0.05, 0.2), 0.0, (Pair.CLAMPED, Pair.CONTACT)),
+])
+def test_initial_modes_of_two_pairs(
+    side: Body, own: tuple[float, float], beside: tuple[float, float], push: float, expected: tuple[Pair, Pair]
+) -> None:
+    """Whichever side is judged first."""
+    b = bench(side, *own, beside=beside, push=push)
     initial_modes(b.plant, b.state)
-    assert (b.mode(side), b.mode(other(side))) == (Pair.CONTACT, Pair.CONTACT)
-    b = bench(side, 0.0, 0.0, beside=(0.0, 0.0), push=-1.0)
-    initial_modes(b.plant, b.state)
-    assert (b.mode(side), b.mode(other(side))) == (Pair.OPEN, Pair.RESTING)
-
-
-@SIDES
-def test_initial_modes_leave_a_decided_pair_alone(side: Body) -> None:
-    for u, d, expected in ((-0.1, 0.0, Pair.OPEN), (0.1, 0.0, Pair.CONTACT), (0.1, -9.0, Pair.CLAMPED)):
-        b = bench(side, u, d, beside=(0.05, 0.2))
-        initial_modes(b.plant, b.state)
-        assert (b.mode(side), b.mode(other(side))) == (expected, Pair.CONTACT)
+    assert (b.mode(side), b.mode(other(side))) == expected
 
 
 # The object under dry friction.
@@ -382,43 +372,28 @@ def test_without_dry_friction_the_object_is_free() -> None:
 
 
 @SIDES
-def test_stick(side: Body) -> None:
-    b = bench(side, -1.0, 0.0, coulomb=5.0, slide=toward(side, Slide.RIGHTWARD), object_speed=1e-17, object_push=4.0)
-    make_slide_transition(b.plant, b.state, Slide.STUCK, b.out)
-    assert b.slide is Slide.STUCK
+@pytest.mark.parametrize(("before", "push", "to", "after", "event"), [
+    (Slide.RIGHTWARD, 4.0, Slide.STUCK, Slide.STUCK, Transition.STICK),
+    (Slide.RIGHTWARD, -6.0, Slide.STUCK, Slide.LEFTWARD, None),  # it turns without a rest
+    (Slide.STUCK, -5.5, Slide.LEFTWARD, Slide.LEFTWARD, Transition.SLIP),
+    (Slide.STUCK, -5.0 * (1.0 - 1e-9), Slide.LEFTWARD, Slide.STUCK, None),  # the series foresaw it too early
+])
+def test_a_slide_begins_and_ends_as_its_force_says(
+    side: Body, before: Slide, push: float, to: Slide, after: Slide, event: Transition | None
+) -> None:
+    """5 N of friction; a series has the error of the accuracy."""
+    to, after = (own if own is Slide.STUCK else toward(side, own) for own in (to, after))
+    if before is Slide.STUCK:
+        b = bench(side, -1.0, 0.0, coulomb=5.0, slide=before, object_push=push)
+        b.plant.bodies[OBJECT, Of.MASS] = math.inf
+    else:
+        b = bench(side, -1.0, 0.0, coulomb=5.0, slide=toward(side, before), object_push=push, object_speed=1e-17)
+    make_slide_transition(b.plant, b.state, to, b.out)
+    assert b.slide is after
     assert b.state.y[V.O] == 0.0
-    assert b.plant.bodies[OBJECT, Of.MASS] == math.inf
-    assert b.events == [(OBJECT, Transition.STICK)]
-
-
-@SIDES
-def test_slip(side: Body) -> None:
-    following = toward(side, Slide.LEFTWARD)
-    b = bench(side, -1.0, 0.0, coulomb=5.0, slide=Slide.STUCK, object_push=-5.5)
-    b.plant.bodies[OBJECT, Of.MASS] = math.inf
-    make_slide_transition(b.plant, b.state, following, b.out)
-    assert b.slide is following
-    assert b.plant.bodies[OBJECT, Of.MASS] == 1.0
-    assert abs(b.plant.bodies[OBJECT, Of.FORCE]) == pytest.approx(0.5)
-    assert b.events == [(OBJECT, Transition.SLIP)]
-
-
-@SIDES
-def test_a_slip_that_the_series_foresaw_too_early_is_none(side: Body) -> None:
-    """They have the error of the accuracy; it slipped and stuck at once, and slipped again."""
-    b = bench(side, -1.0, 0.0, coulomb=5.0, slide=Slide.STUCK, object_push=-5.0 * (1.0 - 1e-9))
-    b.plant.bodies[OBJECT, Of.MASS] = math.inf
-    make_slide_transition(b.plant, b.state, toward(side, Slide.LEFTWARD), b.out)
-    assert (b.slide, b.events, b.plant.bodies[OBJECT, Of.MASS]) == (Slide.STUCK, [], math.inf)
-
-
-@SIDES
-def test_an_object_that_turns_without_a_rest_is_no_event(side: Body) -> None:
-    b = bench(side, -1.0, 0.0, coulomb=5.0, slide=toward(side, Slide.RIGHTWARD), object_speed=1e-17, object_push=-6.0)
-    make_slide_transition(b.plant, b.state, Slide.STUCK, b.out)
-    assert b.slide is toward(side, Slide.LEFTWARD)
-    assert b.state.y[V.O] == 0.0
-    assert b.events == []
+    assert b.plant.bodies[OBJECT, Of.MASS] == (math.inf if after is Slide.STUCK else 1.0)
+    assert after is Slide.STUCK or abs(b.plant.bodies[OBJECT, Of.FORCE]) == pytest.approx(abs(push) - 5.0)
+    assert b.events == ([] if event is None else [(OBJECT, event)])
 
 
 # The begin of an interval: inputs may change.
@@ -469,47 +444,27 @@ def test_an_object_starts_to_slide_if_an_impact_pushes_it(side: Body) -> None:
 
 
 @SIDES
-@pytest.mark.parametrize("mode", [Pair.OPEN, Pair.RESTING])
-def test_a_resting_pair_touches_when_an_input_begins_to_press(side: Body, mode: Pair) -> None:
-    b = begin(bench(side, 0.0, 0.0, mode, push=1.0))
-    assert b.mode(side) is Pair.CONTACT
-    assert b.events == [(side, Transition.TOUCH)]
-    for push, expected in ((0.0, Pair.RESTING), (-1.0, Pair.OPEN)):
-        b = begin(bench(side, 0.0, 0.0, mode, push=push))
-        assert (b.mode(side), b.events) == (expected, [])
-
-
-@SIDES
-def test_a_pair_that_has_begun_from_rest_is_released_when_an_input_pulls_it(side: Body) -> None:
-    for push, expected in ((-1.0, Pair.OPEN), (0.0, Pair.RESTING)):
-        b = begin(bench(side, 0.0, 0.0, Pair.CONTACT, push=push))
-        assert (b.mode(side), b.events) == (expected, [(side, Transition.RELEASE)])
-    b = begin(bench(side, 0.0, 0.0, Pair.CONTACT, push=1.0))
-    assert (b.mode(side), b.events) == (Pair.CONTACT, [])
-
-
-@SIDES
-@pytest.mark.parametrize(
-    ("u", "d", "mode"), [(0.0, -0.3, Pair.CONTACT), (0.0, 0.3, Pair.CONTACT), (1e-9, 0.0, Pair.CONTACT),
-                         (-1e-9, 0.3, Pair.OPEN), (1e-9, -9.0, Pair.CLAMPED), (1e-9, -0.3, Pair.CONTACT)]
-)
-def test_a_tick_leaves_all_other_pairs_alone(side: Body, u: float, d: float, mode: Pair) -> None:
-    b = begin(bench(side, u, d, mode, push=-1.0))
-    assert (b.mode(side), b.events) == (mode, [])
-
-
-@SIDES
-def test_an_object_that_inputs_hold_at_its_turn_sticks(side: Body) -> None:
-    b = begin(bench(side, -1.0, 0.0, coulomb=5.0, slide=toward(side, Slide.RIGHTWARD), object_push=4.0))
-    assert (b.slide, b.events) == (Slide.STUCK, [(OBJECT, Transition.STICK)])
-
-
-@SIDES
-def test_an_open_pair_in_motion_does_not_wait(side: Body) -> None:
-    """u = 1e-17 is rounding: `mode_of` would call it a contact."""
-    b = bench(side, 1e-17, -0.3, beside=(0.0, 0.0))
-    settle_resting(b.plant, b.state, b.out)
-    assert (b.mode(side), b.events) == (Pair.OPEN, [])
+@pytest.mark.parametrize(("u", "d", "mode", "options", "expected", "event"), [
+    *((0.0, 0.0, mode, {"push": push}, after, event) for mode in (Pair.OPEN, Pair.RESTING) for push, after, event in (
+        (1.0, Pair.CONTACT, Transition.TOUCH), (0.0, Pair.RESTING, None), (-1.0, Pair.OPEN, None))),
+    (0.0, 0.0, Pair.CONTACT, {"push": -1.0}, Pair.OPEN, Transition.RELEASE),
+    (0.0, 0.0, Pair.CONTACT, {}, Pair.RESTING, Transition.RELEASE),
+    (0.0, 0.0, Pair.CONTACT, {"push": 1.0}, Pair.CONTACT, None),
+    *((u, d, mode, {"push": -1.0}, mode, None) for u, d, mode in (  # in motion
+        (0.0, -0.3, Pair.CONTACT), (0.0, 0.3, Pair.CONTACT), (1e-9, 0.0, Pair.CONTACT), (-1e-9, 0.3, Pair.OPEN),
+        (1e-9, -9.0, Pair.CLAMPED), (1e-9, -0.3, Pair.CONTACT))),
+    (0.01, -2.0 - 1e-14, Pair.LEAVING, {}, Pair.LEAVING, None),
+    (0.01, -2.0 + 1e-14, Pair.LEAVING, {}, Pair.LEAVING, None),
+    (0.01, -2.0 - 1e-9, Pair.LEAVING, {}, Pair.CLAMPED, Transition.CLAMP),
+    (0.01, -2.0 + 1e-9, Pair.LEAVING, {}, Pair.CONTACT, None),
+    (0.01, -2.0, Pair.LEAVING, {"push": 1.0}, Pair.CONTACT, None),
+    (0.01, -2.0, Pair.LEAVING, {"push": -1.0}, Pair.CLAMPED, Transition.CLAMP),
+])
+def test_what_a_tick_makes_of_a_pair(side: Body, u: float, d: float, mode: Pair, options: dict[str, float],
+                                     expected: Pair, event: Transition | None) -> None:
+    b = begin(bench(side, u, d, mode, **options))  # type: ignore[arg-type]
+    assert b.mode(side) is expected
+    assert b.events == ([] if event is None else [(side, event)])
 
 
 @SIDES
@@ -528,17 +483,6 @@ def test_pairs_that_leave_are_in_contact_again_when_inputs_may_change(side: Body
 
 
 @SIDES
-@pytest.mark.parametrize(("d", "options", "expected"), [
-    (-2.0 - 1e-14, {}, Pair.LEAVING), (-2.0 + 1e-14, {}, Pair.LEAVING), (-2.0 - 1e-9, {}, Pair.CLAMPED),
-    (-2.0 + 1e-9, {}, Pair.CONTACT), (-2.0, {"push": 1.0}, Pair.CONTACT), (-2.0, {"push": -1.0}, Pair.CLAMPED)])
-def test_a_pair_that_glides_goes_on_where_inputs_do_not_move_it(side: Body, d: float, options: dict[str, float],
-                                                                expected: Pair) -> None:
-    b = begin(bench(side, 0.01, d, Pair.LEAVING, **options))  # type: ignore[arg-type]
-    assert b.mode(side) is expected
-    assert b.events == ([(side, Transition.CLAMP)] if expected is Pair.CLAMPED else [])
-
-
-@SIDES
 def test_a_pair_that_is_pushed_back_pushes_back_the_other_one(side: Body) -> None:
     """Both glide, and an input presses only one arm; the object that it pushes comes towards the other one."""
     glides = (0.01, -2.0)
@@ -547,17 +491,20 @@ def test_a_pair_that_is_pushed_back_pushes_back_the_other_one(side: Body) -> Non
 
 
 @SIDES
-def test_a_stuck_object_slips_when_an_input_exceeds_its_friction(side: Body) -> None:
-    b = begin(bench(side, -1.0, 0.0, coulomb=5.0, slide=Slide.STUCK, object_push=6.0))
-    assert b.slide is toward(side, Slide.RIGHTWARD)
-    assert b.events == [(OBJECT, Transition.SLIP)]
-    held = begin(bench(side, -1.0, 0.0, coulomb=5.0, slide=Slide.STUCK, object_push=4.0))
-    assert (held.slide, held.events) == (Slide.STUCK, [])
-    moving = begin(bench(side, -1.0, 0.0, coulomb=5.0, slide=Slide.STUCK, object_speed=1.0))
-    moved = toward(side, Slide.RIGHTWARD)
-    assert (moving.slide, moving.events) == (moved, [(OBJECT, Transition.SLIP)])
-    again = begin(bench(side, -1.0, 0.0, coulomb=5.0, slide=moved, object_speed=1.0))
-    assert (again.slide, again.events) == (moved, [])
+@pytest.mark.parametrize(("before", "options", "after", "event"), [
+    (Slide.STUCK, {"object_push": 6.0}, Slide.RIGHTWARD, Transition.SLIP),
+    (Slide.STUCK, {"object_push": 4.0}, Slide.STUCK, None),
+    (Slide.STUCK, {"object_speed": 1.0}, Slide.RIGHTWARD, Transition.SLIP),
+    (Slide.RIGHTWARD, {"object_speed": 1.0}, Slide.RIGHTWARD, None),
+    (Slide.RIGHTWARD, {"object_push": 4.0}, Slide.STUCK, Transition.STICK),  # held at its turn
+])
+def test_what_a_tick_makes_of_an_object(side: Body, before: Slide, options: dict[str, float], after: Slide,
+                                        event: Transition | None) -> None:
+    """5 N of friction."""
+    before, after = (own if own is Slide.STUCK else toward(side, own) for own in (before, after))
+    b = begin(bench(side, -1.0, 0.0, coulomb=5.0, slide=before, **options))  # type: ignore[arg-type]
+    assert b.slide is after
+    assert b.events == ([] if event is None else [(OBJECT, event)])
 
 
 @SIDES
@@ -574,18 +521,26 @@ def test_an_interval_that_goes_on_keeps_its_modes(side: Body) -> None:
 
 
 @SIDES
-@pytest.mark.parametrize(
-    ("u", "d", "mode", "touches"),
-    [
-        (0.0, 0.0, Pair.OPEN, True), (0.0, 0.0, Pair.RESTING, True),
-        (-1e-9, 0.0, Pair.OPEN, False), (0.0, -1e-9, Pair.OPEN, False),
-        (0.0, 0.0, Pair.ABSENT, False), (0.0, 0.0, Pair.LEAVING, False), (0.0, 0.0, Pair.CONTACT, False),
-    ],
-)
-def test_only_a_pair_at_rest_without_force_settles(side: Body, u: float, d: float, mode: Pair, touches: bool) -> None:
-    b = bench(side, u, d, mode, push=1.0)
+@pytest.mark.parametrize(("u", "d", "mode", "options", "expected"), [
+    (0.0, 0.0, Pair.OPEN, {"push": 1.0}, Pair.CONTACT),
+    (0.0, 0.0, Pair.RESTING, {"push": 1.0}, Pair.CONTACT),
+    *((u, d, mode, {"push": 1.0}, mode) for u, d, mode in (
+        (-1e-9, 0.0, Pair.OPEN), (0.0, -1e-9, Pair.OPEN), (0.0, 0.0, Pair.ABSENT), (0.0, 0.0, Pair.LEAVING),
+        (0.0, 0.0, Pair.CONTACT))),
+    (1e-17, -0.3, Pair.OPEN, {"beside": (0.0, 0.0)}, Pair.OPEN),  # u is rounding: `mode_of` would call it a contact
+    *((0.0, 0.0, mode, {"beside_mode": beside_mode, "beside": beside}, expected)
+      for mode in (Pair.OPEN, Pair.RESTING) for beside_mode, beside, expected in (
+        (Pair.CONTACT, (0.01, 0.1), Pair.CONTACT), (Pair.CONTACT, (0.0, 0.1), Pair.CONTACT),
+        (Pair.CLAMPED, (0.01, -9.0), Pair.RESTING), (Pair.OPEN, (-0.1, 0.1), Pair.RESTING))),
+])
+def test_only_a_pair_at_rest_without_force_settles(
+    side: Body, u: float, d: float, mode: Pair, options: dict[str, Any], expected: Pair
+) -> None:
+    """By its input, or by what the other one begins to push."""
+    b = bench(side, u, d, mode, **options)
     settle_resting(b.plant, b.state, b.out)
-    assert b.mode(side) is (Pair.CONTACT if touches else mode)
+    touches = expected is Pair.CONTACT is not mode
+    assert b.mode(side) is expected
     assert b.events == ([(side, Transition.TOUCH)] if touches else [])
     assert b.recorded_motion == ([(0.0, 0.0)] if touches else [])
 
@@ -599,19 +554,6 @@ def test_a_pair_at_rest_is_one_at_zero_without_speed(side: Body, u: float, d: fl
 def test_a_closed_pair_is_between_its_touch_and_its_release() -> None:
     closed = {Pair.CONTACT, Pair.BEGINNING, Pair.CLAMPED, Pair.LEAVING}
     assert {mode for mode in Pair if is_closed(mode)} == closed
-
-
-@SIDES
-@pytest.mark.parametrize("mode", [Pair.OPEN, Pair.RESTING])
-def test_a_resting_pair_touches_when_the_other_one_begins_to_push(side: Body, mode: Pair) -> None:
-    for beside_mode, beside, expected in (
-        (Pair.CONTACT, (0.01, 0.1), Pair.CONTACT), (Pair.CONTACT, (0.0, 0.1), Pair.CONTACT),
-        (Pair.CLAMPED, (0.01, -9.0), Pair.RESTING), (Pair.OPEN, (-0.1, 0.1), Pair.RESTING),
-    ):
-        b = bench(side, 0.0, 0.0, mode, beside=beside, beside_mode=beside_mode)
-        settle_resting(b.plant, b.state, b.out)
-        assert b.mode(side) is expected
-        assert b.events == ([(side, Transition.TOUCH)] if expected is Pair.CONTACT else [])
 
 
 @SIDES
@@ -670,13 +612,6 @@ def test_an_object_at_rest_that_slips_needs_the_force_that_lets_it(side: Body, s
 
 
 @SIDES
-def test_a_pair_that_glides_leaves_alone(side: Body) -> None:
-    b = bench(side, 0.01, -2.0, Pair.CONTACT)
-    let_leave(b.plant, b.state, b.settings)
-    assert (b.mode(side), b.mode(other(side)), b.events) == (Pair.LEAVING, Pair.OPEN, [])
-
-
-@SIDES
 def test_a_pair_that_will_turn_back_does_not_leave(side: Body) -> None:
     """20 u |u''| beside u'^2: a push that turns it before u = 0 keeps it in contact."""
     assert together(side, 0.5, -1e-4, (0.5, -1e-4)) == LEAVING
@@ -697,10 +632,17 @@ def test_one_pair_alone_does_not_leave_without_its_force(side: Body, beside_mode
 
 
 @SIDES
-def test_only_a_pair_in_contact_leaves(side: Body) -> None:
-    b = bench(side, 0.01, -2.0, Pair.CLAMPED)
+@pytest.mark.parametrize(("d", "mode", "options", "expected"), [
+    (-2.0, Pair.CONTACT, {}, Pair.LEAVING), (-1.0, Pair.CONTACT, {}, Pair.CONTACT),
+    (-2.0, Pair.CONTACT, {"push": 1.0}, Pair.CONTACT),
+    *((-2.0, mode, {}, mode) for mode in Pair if mode is not Pair.CONTACT),
+])
+def test_only_a_pair_in_contact_that_nothing_moves_leaves_alone(
+    side: Body, d: float, mode: Pair, options: dict[str, Any], expected: Pair
+) -> None:
+    b = bench(side, 0.01, d, mode, **options)
     let_leave(b.plant, b.state, b.settings)
-    assert b.mode(side) is Pair.CLAMPED
+    assert (b.mode(side), b.mode(other(side)), b.events) == (expected, Pair.OPEN, [])
 
 
 # Pairs that begin without their force.
