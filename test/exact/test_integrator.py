@@ -22,6 +22,7 @@ from grasp_ros.exact.driver.callback import SIGNATURE
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.observe.observer import observe, watch
 from grasp_ros.observe.record import Wanted
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import Work
 from grasp_ros.simulation import ensemble, simulate
 from grasp_ros.simulation.chunk import Setup
@@ -164,19 +165,19 @@ def test_event_budget_beyond_the_kernel_rows() -> None:
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -1.0])
 def test_bad_durations_are_refused(bad: float) -> None:
-    with pytest.raises(ValueError, match="duration"):
+    with pytest.raises(Refused, match="duration"):
         Integrator(system_of(make_grasp(), np.array(AT_REST)), continuous=True).advance(bad)
 
 
 @pytest.mark.parametrize("state", [AT_REST[:5], [math.nan, *AT_REST[1:]], [math.inf, *AT_REST[1:]], [AT_REST]])
 def test_bad_states_are_refused(state: Any) -> None:
-    with pytest.raises(ValueError, match="six finite"):
+    with pytest.raises(Refused, match="six finite"):
         Integrator(system_of(make_grasp(), np.array(state)), continuous=True)
 
 
 @pytest.mark.parametrize("accuracy", [0.0, -1.0, 9e-17, 2e-3, math.nan])
 def test_bad_accuracies_are_refused(accuracy: float) -> None:
-    with pytest.raises(ValueError, match="accuracy"):
+    with pytest.raises(Refused, match="accuracy"):
         Integrator(system_of(make_grasp(), np.array(AT_REST)), continuous=True, accuracy=accuracy)
 
 

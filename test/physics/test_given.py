@@ -148,6 +148,7 @@ NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
     (lambda scene: design(scene, {GAIN: (1, 2)}, "touches"), "case_01", "scene: str"),
     (lambda keys: ensemble(CASE, {}, sensitivity=keys), [3], "sensitivity: [3]"),
     (lambda method: simulate(CASE, method=method), [], "method: list"),
+    (lambda method: simulate(CASE, method=method), "euler", "method 'euler'"),
     (lambda progress: simulate(CASE, progress=progress), 1, "progress: 1"),
     (lambda progress: ensemble(CASE, {}, progress=progress), "yes", "progress: 'yes'"),
     (lambda progress: design(CASE, {GAIN: (1, 2)}, "touches", progress=progress), [], "progress: []"),

@@ -8,7 +8,7 @@ from documents import scene_of
 
 from grasp_ros import scene as scenes
 from grasp_ros.cli.main import main
-from grasp_ros.scene import Scene, SceneError, load
+from grasp_ros.scene import Scene, load
 from grasp_ros.scene.effects import EFFECTS
 from grasp_ros.simulation import simulate
 
@@ -125,13 +125,6 @@ def test_a_grasp_under_load_may_be_started_where_it_rests() -> None:
         held = started(scene, simulate(scene).state[-1])
         assert held.initial_state[0] > held.initial_state[4]
         assert held.warnings == ()
-
-
-def test_a_sine_that_no_staircase_of_control_periods_can_show_is_refused() -> None:
-    with pytest.raises(SceneError, match=r"object_sine.frequency_Hz: 500.1 is not allowed; allowed: at most 500.0 Hz"):
-        load("sine", ["object_sine.frequency_Hz=500.1"])
-    with pytest.raises(SceneError, match=r"object_sine.frequency_Hz: 3.0 .* at most 2.5 Hz"):
-        load("sine", ["time.control_period_s=0.2"])
 
 
 def test_examples_of_the_effects_do_not_warn() -> None:

@@ -111,8 +111,6 @@ def test_contacts_of_a_recording_are_those_of_the_events() -> None:
 
 def test_what_is_refused(tmp_path: Path) -> None:
     run = simulate(scenes.load("case_01"))
-    with pytest.raises(Refused, match=r"width_mm: 1.0 is not allowed; allowed: 60 to 1000 mm"):
-        compose([run], [""], width_mm=1.0)
     with pytest.raises(Refused, match=r"^span: 1.0 after 2.0 is not allowed"):
         plots.draw(run, tmp_path / "a.png", span=(2.0, 1.0))
     for grid in ([], [1.0], [1.0, 1.0]):

@@ -159,7 +159,7 @@ def test_changes_act_from_their_tick_on() -> None:
     ],
 )
 def test_changes_that_no_graph_would_take_are_refused(changes: dict, sampled: bool, words: str) -> None:
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises(Refused, match=words):
         simulate(scenes.load("noise" if sampled else "case_01"), sampled=sampled, changes=changes)
 
 

@@ -34,7 +34,7 @@ def test_continuous_is_the_integrator() -> None:
 @pytest.mark.parametrize("grid", [[0.0, 2.1], [-0.1, 1.0], [1.0, 0.5], [0.0, np.nan], [0.0, np.inf], [2.0000000001]])
 @pytest.mark.parametrize("sampled", [False, True])
 def test_bad_grids_are_refused(grid: Any, sampled: bool) -> None:
-    with pytest.raises(ValueError, match="grid"):
+    with pytest.raises(Refused, match="grid"):
         simulate(case_of(), grid=np.array(grid), sampled=sampled)
 
 
