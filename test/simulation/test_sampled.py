@@ -138,6 +138,7 @@ def test_a_loop_that_grows_without_bound_ends_with_a_status() -> None:
                      "left_sensor.velocity_step_m_per_s=1e-12")
     run = simulate(scene)
     assert run.status is Status.OUTSIDE
+    assert "farther away or faster" in run.stop
     assert 1e9 < np.abs(run.state[:, :2]).max() <= 1e12
 
 
