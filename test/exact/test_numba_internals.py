@@ -110,7 +110,6 @@ def test_a_file_that_cannot_be_rebuilt_is_compiled_anew(cached: Path) -> None:
 def test_kernels_that_cannot_be_kept_where_they_belong_are_kept_among_temporary_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Each command compiled anew, said that it was for once, and left a directory."""
     (tmp_path / "file").touch()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file"))
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))

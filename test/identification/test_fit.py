@@ -188,7 +188,6 @@ def test_times_may_be_a_rounding_off_the_ticks_and_a_body_without_a_force_needs_
 
 
 def test_an_initial_value_that_was_measured_starts_there() -> None:
-    """From -0.2 the search ended at -0.03, with a narrow interval."""
     scene, key = load("case_01", ["time.duration_s=2"]), "right_arm.position_m"
     found = fit(noisy(simulate(scene), 7), [key], scene.changed({key: -0.2}))
     assert found.low[0] < 0.5 < found.high[0]
@@ -353,7 +352,7 @@ def test_the_law_of_another_controller_has_no_numbers() -> None:
 
 
 def test_a_bag_without_commands_does_not_say_which_law_acted(held: Trajectory, tmp_path: Path) -> None:
-    """The law of the scene was taken for granted: gains that somebody had set came out between the two values."""
+    """Somebody may have set other gains than those of the scene."""
     recorder.write(tmp_path / "bag", held)
     rewritten(tmp_path / "bag" / "bag.mcap", tmp_path / "new.mcap", without={"/left/effort_command": 0})
     assert fit(tmp_path / "new.mcap", [P_LEFT]).estimates == pytest.approx([0.1], rel=1e-9)
@@ -362,13 +361,12 @@ def test_a_bag_without_commands_does_not_say_which_law_acted(held: Trajectory, t
 
 
 def test_recorded_inputs_keep_their_times(held: Trajectory) -> None:
-    """Those of every 2 ms were held for 1 ms each, and the stiffness was wrong by a factor of three."""
     with pytest.raises(Refused, match=r"its inputs change every 0\.002 s; allowed: a scene with that time\.control"):
         fit(held, [P_LEFT], SCENE.changed({"time.control_period_s": 0.001}))
 
 
 def test_a_start_whose_motions_take_for_ever_is_refused(held: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An object of 1 ug between arms of 1 kg bounces in each contact; a fit was silent for hours."""
+    """An object of 1 ug between arms of 1 kg bounces in each contact."""
     monkeypatch.setattr("grasp_ros.identification.search.WORK", 1000)
     with pytest.raises(Refused, match=r"run: object.mass_kg 1e-09: with these starts no run .* reaches its end"):
         fit(held, ["object.mass_kg"], SCENE.changed({"object.mass_kg": 1e-9}))

@@ -1,4 +1,4 @@
-"""Files from strangers: each of these once ended in a traceback, a hang, gigabytes, or was taken for valid."""
+"""Files from strangers: none may end in a traceback, a hang or gigabytes, or be taken for valid."""
 
 from __future__ import annotations
 
@@ -182,7 +182,6 @@ def test_commands_that_do_not_go_with_the_times_of_a_sampled_run_are_refused(
 
 
 def test_a_sampled_run_with_fewer_states_than_times_is_refused(tmp_path: Path) -> None:
-    """One state was taken, and tables of the run were a traceback; so were events with a sixth number."""
     run = simulate(scenes.load("arm_alone"), grid=np.linspace(0.0, 1.0, 5), sampled=True)
     replace(run, state=run.state[:1]).save(tmp_path / "a.npz")
     with pytest.raises(Refused, match=re.escape("state: shape (1, 6) is not allowed; allowed: (5, 6)")):

@@ -107,7 +107,6 @@ def refused(run: Trajectory, sentence: str) -> None:
 
 @pytest.mark.parametrize("method", ["rk45", "rk45_events", "lsoda_events", "radau_events", "dop853"])
 def test_a_solver_of_scipy_gives_each_output_for_itself(method: str) -> None:
-    """Contacts and losses of its runs were refused, because its last bits went with the number of outputs."""
     run = simulate(scene.load("case_01", ["time.duration_s=4"]), method=method, setting=1e-9)
     assert run.at(np.linspace(0.0, 4.0, 1001)).shape == (1001, 6)
     assert "lost_J" in summary(run)
