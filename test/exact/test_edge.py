@@ -207,22 +207,19 @@ def test_a_wall_hands_no_force_on(side: Body) -> None:
 
 
 @SIDES
-@pytest.mark.parametrize(
-    ("own", "beside", "expected"),
-    [
-        ({}, {"d": 0.3}, (3.5, math.inf)),  # its force will press this pair, with t^(3/2)
-        ({}, {"push": 1.0}, (5.0, 6.0 * 1e4 * 0.5**1.5)),  # 1e4 (t^2 / 2)^(3/2), differentiated three times
-        ({}, {"d": -0.3}, (3.5, math.inf)),
-        ({}, {}, (NEVER, 0.0)),
-        ({"push": 1.0}, {"d": 0.3}, (2.0, 1.0)),
-        ({"push": -1.0}, {"d": 0.3}, (2.0, -1.0)),
-        ({"push": 1.0}, {"push": 1.0}, (2.0, 1.0)),
-        ({"speed": 0.5, "stiffness": 2.0}, {"d": 0.3}, (3.0, -1.0)),
-        ({"speed": 0.5, "stiffness": 2.0}, {"push": 1.0}, (3.0, -1.0)),
-        ({"common": 1.0, "stiffness": 2.0}, {"d": 0.3}, (3.5, math.inf)),  # of its own: (4.0, -2.0), which is later
-        ({"common": 1.0, "stiffness": 2.0}, {"push": 1.0}, (4.0, -2.0)),
-    ],
-)
+@pytest.mark.parametrize(("own", "beside", "expected"), [
+    ({}, {"d": 0.3}, (3.5, math.inf)),  # its force will press this pair, with t^(3/2)
+    ({}, {"push": 1.0}, (5.0, 6.0 * 1e4 * 0.5**1.5)),  # 1e4 (t^2 / 2)^(3/2), differentiated three times
+    ({}, {"d": -0.3}, (3.5, math.inf)),
+    ({}, {}, (NEVER, 0.0)),
+    ({"push": 1.0}, {"d": 0.3}, (2.0, 1.0)),
+    ({"push": -1.0}, {"d": 0.3}, (2.0, -1.0)),
+    ({"push": 1.0}, {"push": 1.0}, (2.0, 1.0)),
+    ({"speed": 0.5, "stiffness": 2.0}, {"d": 0.3}, (3.0, -1.0)),
+    ({"speed": 0.5, "stiffness": 2.0}, {"push": 1.0}, (3.0, -1.0)),
+    ({"common": 1.0, "stiffness": 2.0}, {"d": 0.3}, (3.5, math.inf)),  # of its own: (4.0, -2.0), which is later
+    ({"common": 1.0, "stiffness": 2.0}, {"push": 1.0}, (4.0, -2.0)),
+])
 def test_beside_a_pair_that_begins_at_zero(
     side: Body, own: dict[str, float], beside: dict[str, float], expected: tuple[float, float]
 ) -> None:

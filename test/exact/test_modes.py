@@ -47,17 +47,14 @@ def toward(side: Body, slide: Slide) -> Slide:
 
 
 @SIDES
-@pytest.mark.parametrize(
-    ("kind", "before", "after", "u", "d", "u_after"),
-    [
-        (Transition.TOUCH, Pair.OPEN, Pair.CONTACT, 1e-17, 0.3, 0.0),
-        (Transition.RELEASE, Pair.CONTACT, Pair.OPEN, -1e-17, -0.3, 0.0),
-        (Transition.RELEASE, Pair.CLAMPED, Pair.OPEN, 1e-17, -3.0, 0.0),
-        (Transition.RELEASE, Pair.LEAVING, Pair.OPEN, 1e-17, -0.3, 0.0),
-        (Transition.CLAMP, Pair.CONTACT, Pair.CLAMPED, 0.01, -2.0, 0.01),
-        (Transition.REENTRY, Pair.CLAMPED, Pair.CONTACT, 0.01, -2.0, 0.01),
-    ],
-)
+@pytest.mark.parametrize(("kind", "before", "after", "u", "d", "u_after"), [
+    (Transition.TOUCH, Pair.OPEN, Pair.CONTACT, 1e-17, 0.3, 0.0),
+    (Transition.RELEASE, Pair.CONTACT, Pair.OPEN, -1e-17, -0.3, 0.0),
+    (Transition.RELEASE, Pair.CLAMPED, Pair.OPEN, 1e-17, -3.0, 0.0),
+    (Transition.RELEASE, Pair.LEAVING, Pair.OPEN, 1e-17, -0.3, 0.0),
+    (Transition.CLAMP, Pair.CONTACT, Pair.CLAMPED, 0.01, -2.0, 0.01),
+    (Transition.REENTRY, Pair.CLAMPED, Pair.CONTACT, 0.01, -2.0, 0.01),
+])
 def test_arrow(side: Body, kind: Transition, before: Pair, after: Pair, u: float, d: float, u_after: float) -> None:
     b = bench(side, u, d, before, beside=(0.2, 0.1), beside_mode=Pair.CONTACT)
     make_transition(b.plant, b.state, side, kind, False, b.out)
@@ -204,22 +201,19 @@ def test_a_push_is_certain_since_it_exceeds_its_rounding_or_from_the_begin(
 
 
 @SIDES
-@pytest.mark.parametrize(
-    ("u", "d", "p", "expected"),
-    [
-        (-1e-3, 5.0, 0.5, Pair.OPEN),
-        (-1e-3, -5.0, 0.5, Pair.OPEN),
-        (-5e-324, 0.4, 0.5, Pair.OPEN),
-        (1e-3, 5.0, 0.5, Pair.CONTACT),
-        (1e-3, -1.9, 0.5, Pair.CONTACT),
-        (1e-3, -2.0, 0.5, Pair.CONTACT),  # u' = -1/p for ever belongs to the contact, (10)
-        (1e-3, -2.0000001, 0.5, Pair.CLAMPED),
-        (1e-3, -1e9, 0.0, Pair.CONTACT),  # p = 0: there is no second surface
-        (0.0, 0.4, 0.5, Pair.CONTACT),
-        (0.0, -0.4, 0.5, Pair.OPEN),
-        (0.0, -4.0, 0.5, Pair.OPEN),
-    ],
-)
+@pytest.mark.parametrize(("u", "d", "p", "expected"), [
+    (-1e-3, 5.0, 0.5, Pair.OPEN),
+    (-1e-3, -5.0, 0.5, Pair.OPEN),
+    (-5e-324, 0.4, 0.5, Pair.OPEN),
+    (1e-3, 5.0, 0.5, Pair.CONTACT),
+    (1e-3, -1.9, 0.5, Pair.CONTACT),
+    (1e-3, -2.0, 0.5, Pair.CONTACT),  # u' = -1/p for ever belongs to the contact, (10)
+    (1e-3, -2.0000001, 0.5, Pair.CLAMPED),
+    (1e-3, -1e9, 0.0, Pair.CONTACT),  # p = 0: there is no second surface
+    (0.0, 0.4, 0.5, Pair.CONTACT),
+    (0.0, -0.4, 0.5, Pair.OPEN),
+    (0.0, -4.0, 0.5, Pair.OPEN),
+])
 def test_the_mode_follows_from_the_state(side: Body, u: float, d: float, p: float, expected: Pair) -> None:
     for beside_mode in (Pair.OPEN, Pair.CONTACT):
         b = bench(side, u, d, p=p, beside_mode=beside_mode)
@@ -238,20 +232,17 @@ PRESSING = {"beside": (0.01, 0.0), "beside_mode": Pair.CONTACT}  # 10 N towards 
 
 
 @SIDES
-@pytest.mark.parametrize(
-    ("speed", "options", "expected"),
-    [
-        (-2.0, {"push": 1.0}, Pair.CONTACT),
-        (-2.0, {"push": -1.0}, Pair.CLAMPED),
-        (-2.0, {"push": 1.0, "object_push": 2.0}, Pair.CLAMPED),
-        (-2.0, {"push": -1.0, **PRESSING}, Pair.CONTACT),
-        (-2.0, {"push": -11.0, **PRESSING}, Pair.CLAMPED),
-        (math.nextafter(-2.0, 0.0), {"push": -1.0}, Pair.CLAMPED),  # within rounding the speed decides nothing
-        (math.nextafter(-2.0, -9.0), {"push": 1.0}, Pair.CONTACT),
-        (-2.0 + 1e-14, {"push": -1.0}, Pair.CONTACT),
-        (-2.0 - 1e-14, {"push": 1.0}, Pair.CLAMPED),
-    ],
-)
+@pytest.mark.parametrize(("speed", "options", "expected"), [
+    (-2.0, {"push": 1.0}, Pair.CONTACT),
+    (-2.0, {"push": -1.0}, Pair.CLAMPED),
+    (-2.0, {"push": 1.0, "object_push": 2.0}, Pair.CLAMPED),
+    (-2.0, {"push": -1.0, **PRESSING}, Pair.CONTACT),
+    (-2.0, {"push": -11.0, **PRESSING}, Pair.CLAMPED),
+    (math.nextafter(-2.0, 0.0), {"push": -1.0}, Pair.CLAMPED),  # within rounding the speed decides nothing
+    (math.nextafter(-2.0, -9.0), {"push": 1.0}, Pair.CONTACT),
+    (-2.0 + 1e-14, {"push": -1.0}, Pair.CONTACT),
+    (-2.0 - 1e-14, {"push": 1.0}, Pair.CLAMPED),
+])
 def test_on_the_surface_what_moves_u_rate_decides(
     side: Body, speed: float, options: dict[str, Any], expected: Pair
 ) -> None:
@@ -266,33 +257,30 @@ def test_the_rounding_on_the_surface_is_that_of_the_velocities() -> None:
 
 
 @SIDES
-@pytest.mark.parametrize(
-    ("options", "expected"),
-    [
-        ({"push": 1.0}, Pair.CONTACT),  # pressed together
-        ({"push": 1.0, "object_push": 0.5}, Pair.CONTACT),
-        ({"object_push": -1.0}, Pair.CONTACT),
-        ({"push": -1.0}, Pair.OPEN),  # pulled apart
-        ({"push": 0.5, "object_push": 1.0}, Pair.OPEN),
-        ({}, Pair.RESTING),  # nothing differs
-        ({"push": 1.0, "object_push": 1.0}, Pair.RESTING),
-        ({"object_speed": 0.3, "stiffness": 2.0}, Pair.OPEN),  # order 3: the spring brakes the arm
-        ({"object_speed": -0.3, "stiffness": 2.0}, Pair.CONTACT),
-        ({"push": 1.0, "object_push": 1.0, "stiffness": 2.0}, Pair.OPEN),  # order 4
-        ({"push": -1.0, "object_push": -1.0, "stiffness": 2.0}, Pair.CONTACT),
-        ({**PRESSING}, Pair.CONTACT),  # the other pair presses with 10 N
-        ({"push": -9.0, **PRESSING}, Pair.CONTACT),
-        ({"push": -11.0, **PRESSING}, Pair.OPEN),
-        ({"push": -10.0, "p": 0.0, "beside": (0.01, 0.2), "beside_mode": Pair.CONTACT}, Pair.CONTACT),  # ever more
-        ({"push": -10.0, "p": 0.0, "beside": (0.01, -0.2), "beside_mode": Pair.CONTACT}, Pair.OPEN),
-        ({"beside": (0.01, -9.0), "beside_mode": Pair.CLAMPED}, Pair.RESTING),  # no force
-        ({"beside": (0.0, 0.3), "beside_mode": Pair.CONTACT}, Pair.CONTACT),  # it has just touched: order 3.5
-        ({"push": -1.0, "beside": (0.0, 0.3), "beside_mode": Pair.CONTACT}, Pair.OPEN),  # order 2 comes before
-        ({"object_speed": 0.3, "stiffness": 2.0, "beside": (0.0, 0.3), "beside_mode": Pair.CONTACT}, Pair.OPEN),
-        ({"push": 1.0, "object_push": 1.0, "stiffness": 2.0, "beside": (0.0, 0.3), "beside_mode": Pair.CONTACT},
-         Pair.CONTACT),  # order 4 is its own, and comes behind order 3.5
-    ],
-)
+@pytest.mark.parametrize(("options", "expected"), [
+    ({"push": 1.0}, Pair.CONTACT),  # pressed together
+    ({"push": 1.0, "object_push": 0.5}, Pair.CONTACT),
+    ({"object_push": -1.0}, Pair.CONTACT),
+    ({"push": -1.0}, Pair.OPEN),  # pulled apart
+    ({"push": 0.5, "object_push": 1.0}, Pair.OPEN),
+    ({}, Pair.RESTING),  # nothing differs
+    ({"push": 1.0, "object_push": 1.0}, Pair.RESTING),
+    ({"object_speed": 0.3, "stiffness": 2.0}, Pair.OPEN),  # order 3: the spring brakes the arm
+    ({"object_speed": -0.3, "stiffness": 2.0}, Pair.CONTACT),
+    ({"push": 1.0, "object_push": 1.0, "stiffness": 2.0}, Pair.OPEN),  # order 4
+    ({"push": -1.0, "object_push": -1.0, "stiffness": 2.0}, Pair.CONTACT),
+    ({**PRESSING}, Pair.CONTACT),  # the other pair presses with 10 N
+    ({"push": -9.0, **PRESSING}, Pair.CONTACT),
+    ({"push": -11.0, **PRESSING}, Pair.OPEN),
+    ({"push": -10.0, "p": 0.0, "beside": (0.01, 0.2), "beside_mode": Pair.CONTACT}, Pair.CONTACT),  # ever more
+    ({"push": -10.0, "p": 0.0, "beside": (0.01, -0.2), "beside_mode": Pair.CONTACT}, Pair.OPEN),
+    ({"beside": (0.01, -9.0), "beside_mode": Pair.CLAMPED}, Pair.RESTING),  # no force
+    ({"beside": (0.0, 0.3), "beside_mode": Pair.CONTACT}, Pair.CONTACT),  # it has just touched: order 3.5
+    ({"push": -1.0, "beside": (0.0, 0.3), "beside_mode": Pair.CONTACT}, Pair.OPEN),  # order 2 comes before
+    ({"object_speed": 0.3, "stiffness": 2.0, "beside": (0.0, 0.3), "beside_mode": Pair.CONTACT}, Pair.OPEN),
+    ({"push": 1.0, "object_push": 1.0, "stiffness": 2.0, "beside": (0.0, 0.3), "beside_mode": Pair.CONTACT},
+     Pair.CONTACT),  # order 4 is its own, and comes behind order 3.5
+])
 def test_at_rest_at_zero_the_first_derivative_that_differs_decides(
     side: Body, options: dict[str, Any], expected: Pair
 ) -> None:
@@ -332,15 +320,12 @@ def test_initial_modes_of_two_pairs(
 
 
 @SIDES
-@pytest.mark.parametrize(
-    ("speed", "push", "expected"),
-    [
-        (0.1, 0.0, Slide.RIGHTWARD), (0.1, -9.0, Slide.RIGHTWARD), (-0.1, 0.0, Slide.LEFTWARD),
-        (0.0, 0.0, Slide.STUCK), (0.0, 5.0, Slide.STUCK), (0.0, -5.0, Slide.STUCK),
-        (0.0, 5.0 + 1e-14, Slide.STUCK), (0.0, -5.0 - 1e-14, Slide.STUCK),  # within rounding
-        (0.0, 5.0 + 1e-12, Slide.RIGHTWARD), (0.0, -5.0 - 1e-12, Slide.LEFTWARD),
-    ],
-)
+@pytest.mark.parametrize(("speed", "push", "expected"), [
+    (0.1, 0.0, Slide.RIGHTWARD), (0.1, -9.0, Slide.RIGHTWARD), (-0.1, 0.0, Slide.LEFTWARD),
+    (0.0, 0.0, Slide.STUCK), (0.0, 5.0, Slide.STUCK), (0.0, -5.0, Slide.STUCK),
+    (0.0, 5.0 + 1e-14, Slide.STUCK), (0.0, -5.0 - 1e-14, Slide.STUCK),  # within rounding
+    (0.0, 5.0 + 1e-12, Slide.RIGHTWARD), (0.0, -5.0 - 1e-12, Slide.LEFTWARD),
+])
 def test_the_slide_follows_from_the_state(side: Body, speed: float, push: float, expected: Slide) -> None:
     b = bench(side, -1.0, 0.0, coulomb=5.0, object_speed=speed, object_push=push)
     initial_slide(b.plant, b.state)
@@ -583,20 +568,17 @@ def together(side: Body, u: float, d: float, beside: tuple[float, float], **opti
 
 
 @SIDES
-@pytest.mark.parametrize(
-    ("u", "d", "beside", "expected"),
-    [
-        (0.1, -0.3, (0.1, -0.3), LEAVING),
-        (0.9, -0.3, (0.1, -0.3), LEAVING),
-        (0.9, -0.3, (0.9, -1.3), LEAVING),
-        (0.0, -0.3, (0.1, -0.3), LEAVING),
-        (1.1, -0.3, (0.1, -0.3), STAY),
-        (0.1, -0.3, (0.1, 0.3), STAY),  # one goes, one comes
-        (0.0, 0.3, (0.0, 0.3), STAY),  # both touch at once
-        (0.0, 0.0, (0.1, -0.3), STAY),
-        (0.0, 0.0, (0.0, 0.0), STAY),
-    ],
-)
+@pytest.mark.parametrize(("u", "d", "beside", "expected"), [
+    (0.1, -0.3, (0.1, -0.3), LEAVING),
+    (0.9, -0.3, (0.1, -0.3), LEAVING),
+    (0.9, -0.3, (0.9, -1.3), LEAVING),
+    (0.0, -0.3, (0.1, -0.3), LEAVING),
+    (1.1, -0.3, (0.1, -0.3), STAY),
+    (0.1, -0.3, (0.1, 0.3), STAY),  # one goes, one comes
+    (0.0, 0.3, (0.0, 0.3), STAY),  # both touch at once
+    (0.0, 0.0, (0.1, -0.3), STAY),
+    (0.0, 0.0, (0.0, 0.0), STAY),
+])
 def test_both_pairs_leave_together(
     side: Body, u: float, d: float, beside: tuple[float, float], expected: tuple[Pair, Pair]
 ) -> None:

@@ -146,17 +146,14 @@ def test_processes_that_write_at_once_leave_whole_files(tmp_path: Path) -> None:
         kernel_cache.read_checked(path)
 
 
-@pytest.mark.parametrize(
-    ("owner", "name"),
-    [
-        (JITCodeLibrary, "_finalize_final_module"), (JITCodeLibrary, "_optimize_final_module"),
-        (CPUDispatcher, "compile"), (BaseFunction, "get_call_type"), (NullCache, "load_overload"),
-        (NullCache, "save_overload"), (CompileResult, "_rebuild"), (CompileResult, "_reduce"),
-        (cpu_target.target_context.codegen(), "_library_class"), (cpu_target.target_context.codegen(), "magic_tuple"),
-        (cpu_target.target_context.codegen(), "set_env"),
-        (numba.njit(twice), "_cache"), (numba.njit(twice), "targetctx"), (numba.njit(twice), "targetoptions"),
-    ],
-)
+@pytest.mark.parametrize(("owner", "name"), [
+    (JITCodeLibrary, "_finalize_final_module"), (JITCodeLibrary, "_optimize_final_module"),
+    (CPUDispatcher, "compile"), (BaseFunction, "get_call_type"), (NullCache, "load_overload"),
+    (NullCache, "save_overload"), (CompileResult, "_rebuild"), (CompileResult, "_reduce"),
+    (cpu_target.target_context.codegen(), "_library_class"), (cpu_target.target_context.codegen(), "magic_tuple"),
+    (cpu_target.target_context.codegen(), "set_env"),
+    (numba.njit(twice), "_cache"), (numba.njit(twice), "targetctx"), (numba.njit(twice), "targetoptions"),
+])
 def test_numba_has_what_is_used_of_its_inside(owner: Any, name: str) -> None:
     assert hasattr(owner, name), (
         f"numba {numba.__version__} has moved it; used by grasp_ros/exact/compilation/numba_internals.py"

@@ -22,28 +22,25 @@ def rise(coefficients: Any, h: float) -> float:
     return result
 
 
-@pytest.mark.parametrize(
-    ("coefficients", "h", "expected"),
-    [
-        ([-1.0, 2.0], 1.0, 0.5),
-        ([-1.0, 2.0], 0.4, math.inf),
-        ([-1.0, 1.0], 1.0, 1.0),  # (0, h]
-        ([-1.0, 0.0, 0.0, 0.0, 0.0, 32.0], 1.0, 0.5),
-        ([0.0, -1.0, 1.0], 2.0, 1.0),  # zero at the start, falling
-        ([0.0, -1.0, 1.0], 0.9, math.inf),
-        ([0.0, 0.0, -1.0, 1.0], 2.0, 1.0),  # double zeros at the start are divided out
-        ([0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 4.0], 2.0, 0.5),
-        ([0.0, 0.0, 0.0, -1.0, 2.0], 2.0, 0.5),
-        ([0.0, 0.0, -1.0], 2.0, math.inf),
-        ([0.0, -1.0], 2.0, math.inf),
-        ([0.0, 0.0, 0.0], 2.0, math.inf),
-        ([-0.3, 1.1, -1.0], 1.0, 0.5),  # -(s - 0.5)(s - 0.6): rises at 0.5, falls at 0.6
-        ([-0.24, 1.0, -1.0], 1.0, 0.4),
-        ([-0.26, 1.0, -1.0], 1.0, math.inf),
-        ([-0.25 - 1e-9, 1.0, -1.0], 1.0, math.inf),  # a double root, missed by 1e-9
-        ([-1.0, 0.0, 0.0], 1e300, math.inf),
-    ],
-)
+@pytest.mark.parametrize(("coefficients", "h", "expected"), [
+    ([-1.0, 2.0], 1.0, 0.5),
+    ([-1.0, 2.0], 0.4, math.inf),
+    ([-1.0, 1.0], 1.0, 1.0),  # (0, h]
+    ([-1.0, 0.0, 0.0, 0.0, 0.0, 32.0], 1.0, 0.5),
+    ([0.0, -1.0, 1.0], 2.0, 1.0),  # zero at the start, falling
+    ([0.0, -1.0, 1.0], 0.9, math.inf),
+    ([0.0, 0.0, -1.0, 1.0], 2.0, 1.0),  # double zeros at the start are divided out
+    ([0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 4.0], 2.0, 0.5),
+    ([0.0, 0.0, 0.0, -1.0, 2.0], 2.0, 0.5),
+    ([0.0, 0.0, -1.0], 2.0, math.inf),
+    ([0.0, -1.0], 2.0, math.inf),
+    ([0.0, 0.0, 0.0], 2.0, math.inf),
+    ([-0.3, 1.1, -1.0], 1.0, 0.5),  # -(s - 0.5)(s - 0.6): rises at 0.5, falls at 0.6
+    ([-0.24, 1.0, -1.0], 1.0, 0.4),
+    ([-0.26, 1.0, -1.0], 1.0, math.inf),
+    ([-0.25 - 1e-9, 1.0, -1.0], 1.0, math.inf),  # a double root, missed by 1e-9
+    ([-1.0, 0.0, 0.0], 1e300, math.inf),
+])
 def test_first_rise_of_known_polynomials(coefficients: Any, h: float, expected: float) -> None:
     assert rise(coefficients, h) == pytest.approx(expected, rel=1e-13)
 

@@ -43,15 +43,12 @@ def test_a_scene_keeps_its_own_numbers() -> None:
     assert forces == {"time_s": (0.0, 0.5), "force_N": (1.0, 2.0)}
 
 
-@pytest.mark.parametrize(
-    ("sections", "texts", "complaint"),
-    [
-        ({**OBJECT, "tilt": {"angle_rad": 9.0, "gravity_m_per_s2": 9.81}}, {}, "odd: tilt.angle_rad: 9.0 is not all"),
-        ({**OBJECT, "title": "a text"}, {}, "odd: title: unknown key"),
-        ({"object": OBJECT["object"]}, {}, "odd: time: missing"),
-        (OBJECT, {"watch": None}, "odd: watch: None is not allowed; allowed: a text"),
-    ],
-)
+@pytest.mark.parametrize(("sections", "texts", "complaint"), [
+    ({**OBJECT, "tilt": {"angle_rad": 9.0, "gravity_m_per_s2": 9.81}}, {}, "odd: tilt.angle_rad: 9.0 is not all"),
+    ({**OBJECT, "title": "a text"}, {}, "odd: title: unknown key"),
+    ({"object": OBJECT["object"]}, {}, "odd: time: missing"),
+    (OBJECT, {"watch": None}, "odd: watch: None is not allowed; allowed: a text"),
+])
 def test_sections_are_validated_like_a_file(sections: Any, texts: dict[str, Any], complaint: str) -> None:
     with pytest.raises(SceneError) as caught:
         compose("odd", sections, **texts)

@@ -98,48 +98,42 @@ def test_a_scene_needs_a_body() -> None:
     refused(yaml.safe_dump({key: BASE[key] for key in ("title", "readings", "time")}), "no body", "left_arm")
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (text_with("mass_kg: 1.0", "mass: 1.0"), ["left_arm.mass", "1.0", "mass_kg"]),  # without its unit
-        (text_with("mass_kg: 1.0", "mass_g: 1000.0"), ["left_arm.mass_g", "1000.0", "mass_kg"]),
-        (text_with("mass_kg: 1.0", "mass_kg: 1.0\n  colour: 3"), ["left_arm.colour", "3", "allowed: left_arm.mass_kg"]),
-        (text_with("mass_kg: 1.0", "mass_kg: 1.0\n  mass_kg: 2.0"), ["mass_kg", "twice"]),
-        (text_with("object:", "left_arm:"), ["left_arm", "twice"]),
-        (text_with("object:", "gravity: 9.81\nobject:"), ["gravity", "9.81", "allowed"]),
-        (text_with("mass_kg: 1.0", "1: 1.0"), ["left_arm.1", "unknown key with the value 1.0"]),
-        (text_with("mass_kg: 1.0", "mass_kg: 1,0"), ["left_arm.mass_kg", "1,0"]),
-        (text_with("mass_kg: 1.0", "mass_kg: 1e400"), ["left_arm.mass_kg", "inf"]),
-        (yaml.safe_dump({**BASE, "title": 4}), ["title", "4", "a text"]),
-        (yaml.safe_dump({**BASE, "readings": "one"}), ["readings", "'one'", "a list"]),
-        (yaml.safe_dump({**BASE, "readings": [1]}), ["readings", "[1]"]),
-        (yaml.safe_dump({**BASE, "object": 5}), ["object", "5", "a mapping"]),
-        (yaml.safe_dump({**BASE, "object": None}), ["object", "None", "a mapping"]),
-        ("", ["not a mapping"]),
-        ("- 1\n- 2\n", ["not a mapping"]),
-        ("just text", ["not a mapping"]),
-        ("a: b: c", []),
-        ("? [1, 2]\n: 3\n", []),  # a list as a key
-        ("? {a: 1}\n: 3\n", []),
-    ],
-)
+@pytest.mark.parametrize(("text", "words"), [
+    (text_with("mass_kg: 1.0", "mass: 1.0"), ["left_arm.mass", "1.0", "mass_kg"]),  # without its unit
+    (text_with("mass_kg: 1.0", "mass_g: 1000.0"), ["left_arm.mass_g", "1000.0", "mass_kg"]),
+    (text_with("mass_kg: 1.0", "mass_kg: 1.0\n  colour: 3"), ["left_arm.colour", "3", "allowed: left_arm.mass_kg"]),
+    (text_with("mass_kg: 1.0", "mass_kg: 1.0\n  mass_kg: 2.0"), ["mass_kg", "twice"]),
+    (text_with("object:", "left_arm:"), ["left_arm", "twice"]),
+    (text_with("object:", "gravity: 9.81\nobject:"), ["gravity", "9.81", "allowed"]),
+    (text_with("mass_kg: 1.0", "1: 1.0"), ["left_arm.1", "unknown key with the value 1.0"]),
+    (text_with("mass_kg: 1.0", "mass_kg: 1,0"), ["left_arm.mass_kg", "1,0"]),
+    (text_with("mass_kg: 1.0", "mass_kg: 1e400"), ["left_arm.mass_kg", "inf"]),
+    (yaml.safe_dump({**BASE, "title": 4}), ["title", "4", "a text"]),
+    (yaml.safe_dump({**BASE, "readings": "one"}), ["readings", "'one'", "a list"]),
+    (yaml.safe_dump({**BASE, "readings": [1]}), ["readings", "[1]"]),
+    (yaml.safe_dump({**BASE, "object": 5}), ["object", "5", "a mapping"]),
+    (yaml.safe_dump({**BASE, "object": None}), ["object", "None", "a mapping"]),
+    ("", ["not a mapping"]),
+    ("- 1\n- 2\n", ["not a mapping"]),
+    ("just text", ["not a mapping"]),
+    ("a: b: c", []),
+    ("? [1, 2]\n: 3\n", []),  # a list as a key
+    ("? {a: 1}\n: 3\n", []),
+])
 def test_wrong_files_are_refused(text: str, words: list[str]) -> None:
     refused(text, "dir/bad.yaml", *words)
 
 
-@pytest.mark.parametrize(
-    ("section", "key", "value", "words"),
-    [
-        ("left_feedback", "position_gain_N_per_m", -10.1, ["left_arm", "stiffness", "sum >= 0"]),
-        ("right_feedback", "velocity_gain_Ns_per_m", -0.21, ["right_arm", "damping", "sum >= 0"]),
-        ("time", "duration_s", 20.0005, ["time.duration_s", "20.0005", "whole number of control periods", "0.001"]),
-        ("time", "control_period_s", 0.003, ["time.duration_s", "0.003"]),
-        ("time", "control_period_s", 30.0, ["time.duration_s", "30.0"]),
-        ("time", "control_period_s", 1e-10, ["time.control_period_s", "1e-10", "whole nanoseconds"]),
-        ("time", "control_period_s", 1.5e-9, ["time.control_period_s", "whole nanoseconds"]),
-        ("time", "duration_s", 1 / 3, ["time.duration_s", "whole nanoseconds"]),
-    ],
-)
+@pytest.mark.parametrize(("section", "key", "value", "words"), [
+    ("left_feedback", "position_gain_N_per_m", -10.1, ["left_arm", "stiffness", "sum >= 0"]),
+    ("right_feedback", "velocity_gain_Ns_per_m", -0.21, ["right_arm", "damping", "sum >= 0"]),
+    ("time", "duration_s", 20.0005, ["time.duration_s", "20.0005", "whole number of control periods", "0.001"]),
+    ("time", "control_period_s", 0.003, ["time.duration_s", "0.003"]),
+    ("time", "control_period_s", 30.0, ["time.duration_s", "30.0"]),
+    ("time", "control_period_s", 1e-10, ["time.control_period_s", "1e-10", "whole nanoseconds"]),
+    ("time", "control_period_s", 1.5e-9, ["time.control_period_s", "whole nanoseconds"]),
+    ("time", "duration_s", 1 / 3, ["time.duration_s", "whole nanoseconds"]),
+])
 def test_impossible_combinations_are_refused(section: str, key: str, value: float, words: list[str]) -> None:
     refused(document(section, key, value), "dir/bad.yaml", repr(value) if section == "time" else "", *words)
 

@@ -151,14 +151,11 @@ def test_changes_act_from_their_tick_on() -> None:
     assert changed.command[700, 0] == -50.0 * plain.state[700, 0] - 0.5 * plain.state[700, 1]
 
 
-@pytest.mark.parametrize(
-    ("changes", "sampled", "words"),
-    [
-        ({5: {"left_feedback.position_gain_N_per_m": 9.0}}, False, "continuous"),
-        ({5: {"object.mass_kg": 9.0}}, True, "object.mass_kg at tick 5"),
-        ({5: {"left_sensor.position_noise_m": 0.1}}, True, "left_sensor.position_noise_m at tick 5"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "sampled", "words"), [
+    ({5: {"left_feedback.position_gain_N_per_m": 9.0}}, False, "continuous"),
+    ({5: {"object.mass_kg": 9.0}}, True, "object.mass_kg at tick 5"),
+    ({5: {"left_sensor.position_noise_m": 0.1}}, True, "left_sensor.position_noise_m at tick 5"),
+])
 def test_changes_that_no_graph_would_take_are_refused(changes: dict, sampled: bool, words: str) -> None:
     with pytest.raises(Refused, match=words):
         simulate(scenes.load("noise" if sampled else "case_01"), sampled=sampled, changes=changes)
