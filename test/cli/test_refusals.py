@@ -18,6 +18,7 @@ from grasp_ros.physics.observation import CALLABLE
 from lab.__main__ import with_packages
 
 LONG = "a" * 5000
+GAIN = "left_feedback.position_gain_N_per_m"
 
 
 @pytest.fixture
@@ -72,6 +73,21 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ("plot no.mcap", "no.mcap: not a bag of this package"),
     ("fit no.mcap --free object.mass_kg", "no.mcap: not a bag of this package"),
     ("map case_01 --x object.mass_kg=1:2:10^12 -o m.zarr", "then :n for 2 to 1,000,000,000 values"),
+    ("map case_01 -o m.zarr", "parameters to vary: none"),
+    *((f"map case_01 -o m.zarr {words}", answer) for words, answer in (
+        ("--x mass", "--x mass: not understood; allowed: section.key=low:high"),
+        (f"--x {GAIN}=9:1:4", "9.0 to 1.0 is not allowed"), (f"--x {GAIN}=-1:1:4:log", "> 0 where logarithmic"),
+        ("--x object.mass_kg=-1:1", "object.mass_kg: -1.0 is not allowed; allowed: a number >= 1e-12"),
+        ("--x object.weight=1:2", "object.weight: not in this scene"),
+        (f"--x {GAIN}=1:2 --outcome joy", "outcome joy: not known; allowed: settling_time"),
+        (f"--vary {GAIN}=1:2", "--vary: allowed: with --sample N"),
+        (f"--x {GAIN}=1:2:2 --seed 1", "--seed: allowed: with --sample N"),
+        (f"--x {GAIN}=1:2:3 --sample 9",
+         "n=3 is for a map's axes; allowed: section.key=low:high, + between keys with one value; then ::log"),
+        (f"--x {GAIN}=1:2 --settled 2", "settled: 2.0"),
+        (f"--x {GAIN}=1:2:99999 --y object.mass_kg=1:2:99999", "axes: 9,999,800,001 runs; allowed: at most"))),
+    pytest.param(f"map case_01 -o m.zarr --x {GAIN}=1:2:2 --scheduler tcp://127.0.0.1:9", "nobody answers",
+                 marks=pytest.mark.slow),
     ("design case_01 --sampled --free time.control_period_s=0.001:0.01 --minimise touches_left",
      "a finite touches_left; case_01: time.control_period_s: "),
     ("simulate circle.yaml", "circle.yaml: no such file"),

@@ -142,7 +142,8 @@ def test_bodies_that_are_alike_never_part(side: Body) -> None:
 
 
 @SIDES
-@pytest.mark.parametrize(("u", "d", "p"), [(0.01, 0.2, 0.5), (0.01, -0.2, 0.5), (0.01, 0.3, 0.0), (0.01, -0.3, 0.0)])
+@pytest.mark.parametrize(("u", "d", "p"), [(0.01, 0.2, 0.5), (0.01, -0.2, 0.5), (0.01, 0.3, 0.0), (0.01, -0.3, 0.0),
+                                          (0.01, -2.0, 0.5)])
 def test_the_force_of_the_other_pair_and_its_rate(side: Body, u: float, d: float, p: float) -> None:
     """(6) and its derivative along the motion, in which the force itself takes part."""
     b = bench(side, 0.0, 0.0, beside=(u, d), beside_mode=Pair.CONTACT, p=p, push=0.4, beside_push=-3.0)
@@ -168,17 +169,26 @@ def test_without_force_nothing_pushes_beside(side: Body) -> None:
         assert other_push(b.plant, b.state, side) == (0.0, 0.0)
 
 
-@SIDES
-def test_the_force_of_the_other_pair_decides_with_its_value_and_its_rate(side: Body) -> None:
-    def found(**options: Any) -> Deciding:
-        b = bench(side, 0.0, 0.0, beside=(0.01, options.pop("d")), beside_mode=Pair.CONTACT, p=0.0, **options)
-        return Deciding(*deciding_derivative(b.plant, b.state, side))
+PRESSING = {"p": 0.0, "beside_mode": Pair.CONTACT}
+PUSHED = {"push": 1.0, "object_push": 1.0, "beside_push": 1.0, "stiffness": 2.0}
 
-    assert found(d=0.0) == pytest.approx((2.0, 10.0))
-    assert found(d=0.0, push=-12.0) == pytest.approx((2.0, -2.0))
-    assert found(d=0.2, push=-10.0) == pytest.approx((3.0, 1.5e4 * 0.1 * 0.2))
-    assert found(d=-0.2, push=-10.0) == pytest.approx((3.0, -1.5e4 * 0.1 * 0.2))
-    assert found(d=0.0, push=-10.0) == (UNDECIDED, 0.0)  # the second derivative of the force would decide
+
+@SIDES
+@pytest.mark.parametrize(("d", "options", "expected"), [
+    (0.0, PRESSING, (2.0, 10.0)), (0.0, {**PRESSING, "push": -12.0}, (2.0, -2.0)),
+    (0.2, {**PRESSING, "push": -10.0}, (3.0, 300.0)), (-0.2, {**PRESSING, "push": -10.0}, (3.0, -300.0)),
+    (0.0, {**PRESSING, "push": -10.0}, (UNDECIDED, 0.0)),  # the second derivative of the force would decide
+    # at u' = -1/p the force is zero; what pushes the other arm off that surface lets it grow, either way
+    *((-2.0, {"beside_mode": Pair.CONTACT, "beside_push": push}, (3.0, -5.0 * push)) for push in (-3.0, 3.0)),
+    # closed without a force, or with one soon; the fourth derivative is the first of this pair's own
+    (0.3, {**PUSHED, "beside_mode": Pair.CLAMPED}, (4.0, -2.0)),
+    (0.3, {**PUSHED, "beside_mode": Pair.BEGINNING}, (3.5, math.inf)),
+])
+def test_the_force_of_the_other_pair_decides_with_its_value_and_its_rate(
+    side: Body, d: float, options: dict[str, Any], expected: tuple[float, float]
+) -> None:
+    b = bench(side, 0.0, 0.0, beside=(0.01, d), **options)
+    assert deciding_derivative(b.plant, b.state, side) == pytest.approx(expected)
 
 
 @SIDES
@@ -187,16 +197,6 @@ def test_drag_of_the_object_lessens_what_the_force_of_the_other_pair_does(side: 
     b = bench(side, 0.0, 0.0, beside=(0.01, 0.2), beside_mode=Pair.CONTACT, p=0.0, push=-5.0)
     b.plant.bodies[OBJECT, Of.MASS], b.plant.bodies[OBJECT, Of.DAMPING] = 2.0, 0.8
     assert deciding_derivative(b.plant, b.state, side) == pytest.approx((3.0, 148.0))
-
-
-@SIDES
-@pytest.mark.parametrize("push", [-3.0, 3.0])
-def test_a_force_that_only_begins_at_the_surface_decides_with_its_rate(side: Body, push: float) -> None:
-    """At u' = -1/p the force is zero; what pushes the other arm off that surface lets it grow, either way."""
-    b = bench(side, 0.0, 0.0, beside=(0.01, -2.0), beside_mode=Pair.CONTACT, p=0.5, beside_push=push)
-    value, pace = other_push(b.plant, b.state, side)
-    assert (value, pace) == (0.0, pytest.approx(-5.0 * push))
-    assert deciding_derivative(b.plant, b.state, side) == pytest.approx((3.0, pace))
 
 
 @SIDES
@@ -242,15 +242,6 @@ def test_a_force_that_begins_at_the_surface_by_the_third_derivative_adds_to_the_
     b.plant.bodies[far, Of.STIFFNESS] = 0.8
     b.plant.bodies[far, Of.FORCE] += 0.8 * b.state.y[lane]
     assert deciding_derivative(b.plant, b.state, side) == pytest.approx((4.0, expected))
-
-
-@SIDES
-@pytest.mark.parametrize(("mode", "expected"), [(Pair.CLAMPED, (4.0, -2.0)), (Pair.BEGINNING, (3.5, math.inf))])
-def test_a_pair_that_is_closed_without_a_force(side: Body, mode: Pair, expected: tuple[float, float]) -> None:
-    """It has none at all, or is going to have one soon; the fourth derivative is the first of this pair's own."""
-    b = bench(side, 0.0, 0.0, beside=(0.01, 0.3), beside_mode=mode, push=1.0, object_push=1.0, beside_push=1.0,
-              stiffness=2.0)
-    assert deciding_derivative(b.plant, b.state, side) == pytest.approx(expected)
 
 
 # How long the sign is certain.

@@ -77,13 +77,6 @@ def test_splitting_one_horizon_changes_nothing(name: str, pieces: int) -> None:
         assert a.time == pytest.approx(b.time, abs=2e-11)
 
 
-def test_repeated_and_empty_output_times() -> None:
-    scene = scenes.load("case_01")
-    result = run(grasp_of(scene), scene.initial_state, 1.0, [0.0, 0.0, 0.45, 0.45, 1.0, 1.0])
-    assert np.array_equal(result.states[::2], result.states[1::2])
-    assert run(grasp_of(scene), scene.initial_state, 1.0, []).states.shape == (0, 6)
-
-
 def test_advance_by_nothing_changes_nothing() -> None:
     scene = scenes.load("case_01")
     integrator = Integrator(scene.system, continuous=True)

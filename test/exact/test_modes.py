@@ -76,11 +76,18 @@ def clamp(b: Bench, side: Body, at: float = 1.0) -> None:
 
 
 @SIDES
-@pytest.mark.parametrize("beside_mode", [Pair.OPEN, Pair.LEAVING, Pair.RESTING, Pair.ABSENT])
-def test_a_pair_that_glides_on_the_surface_leaves_without_an_event(side: Body, beside_mode: Pair) -> None:
-    b = bench(side, 0.01, -2.0, Pair.CONTACT, beside_mode=beside_mode)
+@pytest.mark.parametrize(("beside_mode", "options", "expected"), [
+    *((mode, {}, Pair.LEAVING) for mode in (Pair.OPEN, Pair.LEAVING, Pair.RESTING, Pair.ABSENT)),
+    *((Pair.OPEN, options, Pair.CLAMPED)
+      for options in ({"push": -1.0}, {"push": 1e-9}, {"stiffness": 1e-3}, {"object_push": 1.0})),
+])
+def test_a_pair_on_the_surface_clamps_if_something_moves_it_and_leaves_without_an_event_otherwise(
+    side: Body, beside_mode: Pair, options: dict[str, Any], expected: Pair
+) -> None:
+    b = bench(side, 0.01, -2.0, Pair.CONTACT, beside_mode=beside_mode, **options)
     clamp(b, side)
-    assert (b.mode(side), b.events) == (Pair.LEAVING, [])
+    assert b.mode(side) is expected
+    assert b.events == ([(side, Transition.CLAMP)] if expected is Pair.CLAMPED else [])
 
 
 @SIDES
@@ -91,14 +98,6 @@ def test_pairs_that_glide_leave_alike(side: Body) -> None:
     make_transitions(b.plant, b.state, Ends(crossing, crossing, NO_SLIDE, 1.0), 1.0, b.out)
     assert (b.mode(side), b.mode(other(side))) == (Pair.CLAMPED, Pair.LEAVING)
     assert b.events == [(side, Transition.CLAMP)]
-
-
-@SIDES
-@pytest.mark.parametrize("options", [{"push": -1.0}, {"push": 1e-9}, {"stiffness": 1e-3}, {"object_push": 1.0}])
-def test_a_pair_that_something_moves_clamps(side: Body, options: dict[str, float]) -> None:
-    b = bench(side, 0.01, -2.0, Pair.CONTACT, **options)  # type: ignore[arg-type]
-    clamp(b, side)
-    assert (b.mode(side), b.events) == (Pair.CLAMPED, [(side, Transition.CLAMP)])
 
 
 @SIDES
@@ -392,40 +391,22 @@ def begin(b: Bench) -> Bench:
 
 
 @SIDES
-def test_a_run_that_starts_gets_its_modes_with_the_touch_of_a_pair_at_zero(side: Body) -> None:
-    b = begin(bench(side, 0.0, 0.0, Pair.UNKNOWN, beside=(0.01, 0.0), beside_mode=Pair.UNKNOWN, push=1.0, coulomb=50.0))
-    assert (b.mode(side), b.mode(other(side)), b.slide) == (Pair.CONTACT, Pair.CONTACT, Slide.STUCK)
-    assert b.events == [(side, Transition.TOUCH)]
-
-
-def test_a_run_that_starts_forgets_the_slide_of_another() -> None:
-    b = begin(bench(LEFT, -1.0, 0.0, Pair.UNKNOWN, beside_mode=Pair.UNKNOWN, slide=Slide.STUCK))
-    assert b.slide is Slide.FREE
-
-
-@SIDES
-def test_a_pair_at_rest_starts_as_friction_lets_it(side: Body) -> None:
-    """Without friction the object would run away from the arm that pushes it."""
-    options = {"push": 1.0, "object_push": 2.0}
-    free = begin(bench(side, 0.0, 0.0, Pair.UNKNOWN, beside_mode=Pair.UNKNOWN, **options))
-    held = begin(bench(side, 0.0, 0.0, Pair.UNKNOWN, beside_mode=Pair.UNKNOWN, coulomb=5.0, **options))
-    assert (free.mode(side), held.mode(side)) == (Pair.OPEN, Pair.CONTACT)
-    assert (free.events, held.events) == ([], [(side, Transition.TOUCH)])
-
-
-@SIDES
-def test_a_pair_on_the_surface_starts_as_friction_lets_it(side: Body) -> None:
-    """u' = -1/p: an object that slides with the pull of 2 N leaves the arm behind, against friction it does not."""
-    options = {"object_push": 2.0, "object_speed": 1.0, "beside_mode": Pair.UNKNOWN}
-    assert begin(bench(side, 0.01, -2.0, Pair.UNKNOWN, **options)).mode(side) is Pair.CLAMPED
-    assert begin(bench(side, 0.01, -2.0, Pair.UNKNOWN, coulomb=5.0, **options)).mode(side) is Pair.CONTACT
-
-
-@SIDES
-def test_an_object_starts_to_slide_if_an_impact_pushes_it(side: Body) -> None:
-    """1e4 (0.01)^(3/2) = 10 N against 5 N."""
-    b = begin(bench(side, 0.01, 0.0, Pair.UNKNOWN, beside_mode=Pair.UNKNOWN, coulomb=5.0))
-    assert (b.slide, b.events) == (toward(side, Slide.RIGHTWARD), [])
+@pytest.mark.parametrize(("u", "d", "options", "expected", "slide", "events"), [
+    (0.0, 0.0, {"beside": (0.01, 0.0), "push": 1.0, "coulomb": 50.0}, Pair.CONTACT, Slide.STUCK, [Transition.TOUCH]),
+    (-1.0, 0.0, {"slide": Slide.STUCK}, Pair.OPEN, Slide.FREE, []),  # it forgets the slide of another one
+    (0.0, 0.0, {"push": 1.0, "object_push": 2.0}, Pair.OPEN, Slide.FREE, []),  # the object runs away from the arm
+    (0.0, 0.0, {"push": 1.0, "object_push": 2.0, "coulomb": 5.0}, Pair.CONTACT, Slide.STUCK, [Transition.TOUCH]),
+    (0.01, -2.0, {"object_push": 2.0, "object_speed": 1.0}, Pair.CLAMPED, Slide.FREE, []),  # it leaves the arm behind
+    (0.01, -2.0, {"object_push": 2.0, "object_speed": 1.0, "coulomb": 5.0}, Pair.CONTACT, Slide.RIGHTWARD, []),
+    (0.01, 0.0, {"coulomb": 5.0}, Pair.CONTACT, Slide.RIGHTWARD, []),  # an impact pushes it with 10 N
+])
+def test_a_run_starts_as_its_state_and_its_friction_say(
+    side: Body, u: float, d: float, options: dict[str, Any], expected: Pair, slide: Slide, events: list[Transition]
+) -> None:
+    b = begin(bench(side, u, d, Pair.UNKNOWN, beside_mode=Pair.UNKNOWN, **options))
+    assert (b.mode(side), b.mode(other(side))) == (expected, Pair.CONTACT if "beside" in options else Pair.OPEN)
+    assert b.slide is (toward(side, slide) if slide is Slide.RIGHTWARD else slide)
+    assert b.events == [(side, event) for event in events]
 
 
 @SIDES
@@ -558,51 +539,35 @@ def depth(d: float) -> float:
 STAY, LEAVING = ((mode, mode) for mode in (Pair.CONTACT, Pair.LEAVING))
 
 
-def together(side: Body, u: float, d: float, beside: tuple[float, float], **options: Any) -> tuple[Pair, Pair]:
-    """Both pairs in contact, u in units of `depth`: their modes behind `let_leave`."""
+U_SOON = 0.5 * depth(1e-4)  # m
+
+
+@SIDES
+@pytest.mark.parametrize(("u", "d", "beside", "options", "expected"), [
+    (0.1, -0.3, (0.1, -0.3), {}, LEAVING), (0.9, -0.3, (0.1, -0.3), {}, LEAVING),
+    (0.9, -0.3, (0.9, -1.3), {}, LEAVING), (0.0, -0.3, (0.1, -0.3), {}, LEAVING),
+    (1.1, -0.3, (0.1, -0.3), {}, STAY),
+    (0.1, -0.3, (0.1, 0.3), {}, STAY),  # one goes, one comes
+    (0.0, 0.3, (0.0, 0.3), {}, STAY),  # both touch at once
+    (0.0, 0.0, (0.1, -0.3), {}, STAY), (0.0, 0.0, (0.0, 0.0), {}, STAY),
+    # an object at rest that slips needs the force that lets it: without it friction would push it
+    *((0.1, -0.3, (0.1, -0.3), {"slide": slide, "coulomb": 1e-9, "object_speed": speed}, expected)
+      for slide in (Slide.RIGHTWARD, Slide.LEFTWARD) for speed, expected in ((0.0, STAY), (0.5, LEAVING))),
+    # 20 u |u''| beside u'^2: a push that turns it before u = 0 keeps it in contact
+    *((0.5, -1e-4, (0.5, -1e-4), {"push": push}, expected)
+      for push, expected in ((0.0, LEAVING), (1e9, STAY), (-1e9, STAY))),
+    *((0.5, -1e-4, (0.5, -1e-4), {"stiffness": part * (1e-4 / U_SOON) ** 2, "push": part * 1e-8 / U_SOON}, expected)
+      for part, expected in ((1e2, STAY), (1e-2, LEAVING))),  # a spring that a push balances
+])
+def test_both_pairs_leave_together(
+    side: Body, u: float, d: float, beside: tuple[float, float], options: dict[str, Any], expected: tuple[Pair, Pair]
+) -> None:
+    """u in units of `depth`."""
     far = (beside[0] * depth(abs(beside[1])), beside[1])
     b = bench(side, u * depth(abs(d)), d, Pair.CONTACT, beside=far, beside_mode=Pair.CONTACT, **options)
     let_leave(b.plant, b.state, b.settings)
+    assert (b.mode(side), b.mode(other(side))) == expected
     assert b.events == []
-    return b.mode(side), b.mode(other(side))
-
-
-@SIDES
-@pytest.mark.parametrize(("u", "d", "beside", "expected"), [
-    (0.1, -0.3, (0.1, -0.3), LEAVING),
-    (0.9, -0.3, (0.1, -0.3), LEAVING),
-    (0.9, -0.3, (0.9, -1.3), LEAVING),
-    (0.0, -0.3, (0.1, -0.3), LEAVING),
-    (1.1, -0.3, (0.1, -0.3), STAY),
-    (0.1, -0.3, (0.1, 0.3), STAY),  # one goes, one comes
-    (0.0, 0.3, (0.0, 0.3), STAY),  # both touch at once
-    (0.0, 0.0, (0.1, -0.3), STAY),
-    (0.0, 0.0, (0.0, 0.0), STAY),
-])
-def test_both_pairs_leave_together(
-    side: Body, u: float, d: float, beside: tuple[float, float], expected: tuple[Pair, Pair]
-) -> None:
-    assert together(side, u, d, beside) == expected
-
-
-@SIDES
-@pytest.mark.parametrize("slide", [Slide.RIGHTWARD, Slide.LEFTWARD])
-def test_an_object_at_rest_that_slips_needs_the_force_that_lets_it(side: Body, slide: Slide) -> None:
-    """Without it friction would push the object instead of braking it."""
-    assert together(side, 0.1, -0.3, (0.1, -0.3), slide=slide, coulomb=1e-9) == STAY
-    assert together(side, 0.1, -0.3, (0.1, -0.3), slide=slide, coulomb=1e-9, object_speed=0.5) == LEAVING
-
-
-@SIDES
-def test_a_pair_that_will_turn_back_does_not_leave(side: Body) -> None:
-    """20 u |u''| beside u'^2: a push that turns it before u = 0 keeps it in contact."""
-    assert together(side, 0.5, -1e-4, (0.5, -1e-4)) == LEAVING
-    assert together(side, 0.5, -1e-4, (0.5, -1e-4), push=1e9) == STAY
-    assert together(side, 0.5, -1e-4, (0.5, -1e-4), push=-1e9) == STAY
-    u = 0.5 * depth(1e-4)
-    for part, expected in ((1e2, STAY), (1e-2, LEAVING)):  # a spring that a push balances
-        k = part * (1e-4 / u) ** 2
-        assert together(side, 0.5, -1e-4, (0.5, -1e-4), stiffness=k, push=k * u) == expected
 
 
 @SIDES

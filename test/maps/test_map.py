@@ -374,25 +374,7 @@ def test_the_command_says_why_runs_did_not_reach_their_end(tmp_path: Path, capsy
     assert "first run with EVENT_BUDGET: stopped: the event budget is used up before the end of the horizon: t =" in err
 
 
-@pytest.mark.slow
-def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for words, answer in (
-        ([], "parameters to vary: none"), (["--x", "mass"], "--x mass: not understood; allowed: section.key=low:high"),
-        (["--x", f"{GAIN}=9:1:4"], "9.0 to 1.0 is not allowed"),
-        (["--x", f"{GAIN}=-1:1:4:log"], "> 0 where logarithmic"),
-        (["--x", "object.mass_kg=-1:1"], "object.mass_kg: -1.0 is not allowed; allowed: a number >= 1e-12"),
-        (["--x", "object.weight=1:2"], "object.weight: not in this scene"),
-        (["--x", f"{GAIN}=1:2", "--outcome", "joy"], "outcome joy: not known; allowed: settling_time"),
-        (["--vary", f"{GAIN}=1:2"], "--vary: allowed: with --sample N"),
-        (["--x", f"{GAIN}=1:2:2", "--seed", "1"], "--seed: allowed: with --sample N"),
-        (["--x", f"{GAIN}=1:2:3", "--sample", "9"],
-         "n=3 is for a map's axes; allowed: section.key=low:high, + between keys with one value; then ::log"),
-        (["--x", f"{GAIN}=1:2", "--settled", "2"], "settled: 2.0"),
-        (["--x", f"{GAIN}=1:2:99999", "--y", "object.mass_kg=1:2:99999"], "axes: 9,999,800,001 runs; allowed: at most"),
-        (["--x", f"{GAIN}=1:2:2", "--scheduler", "tcp://127.0.0.1:9"], "nobody answers"),
-    ):
-        assert main(["map", "case_01", "--set", SHORT, *words, "-o", str(tmp_path / "new.zarr")]) == 2
-        assert answer in capsys.readouterr().err, words
+def test_a_picture_of_somebody_else_is_not_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     picture = tmp_path / "new_touches_left.png"
     picture.write_text("somebody else's")
     assert main(["map", "case_01", "--set", SHORT, "--x", f"{GAIN}=1:2:2", "-o", str(tmp_path / "new.zarr")]) == 2
