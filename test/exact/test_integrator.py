@@ -13,6 +13,7 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
+from documents import body, made
 from numba.core.registry import CPUDispatcher
 from oracles import AT_REST, CASES, Run, done, energy, kinds, make_grasp, run
 
@@ -138,22 +139,15 @@ def test_event_budget_beyond_the_kernel_rows() -> None:
     assert again.shape == (0, 6)
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -1.0])
-def test_bad_durations_are_refused(bad: float) -> None:
-    with pytest.raises(Refused, match="duration"):
-        Integrator(system_of(make_grasp(), np.array(AT_REST)), continuous=True).advance(bad)
-
-
-@pytest.mark.parametrize("state", [AT_REST[:5], [math.nan, *AT_REST[1:]], [math.inf, *AT_REST[1:]], [AT_REST]])
-def test_bad_states_are_refused(state: Any) -> None:
-    with pytest.raises(Refused, match="six finite"):
-        Integrator(system_of(make_grasp(), np.array(state)), continuous=True)
-
-
-@pytest.mark.parametrize("accuracy", [0.0, -1.0, 9e-17, 2e-3, math.nan])
-def test_bad_accuracies_are_refused(accuracy: float) -> None:
-    with pytest.raises(Refused, match="accuracy"):
-        Integrator(system_of(make_grasp(), np.array(AT_REST)), continuous=True, accuracy=accuracy)
+@pytest.mark.parametrize(("state", "options", "duration", "words"), [
+    *((AT_REST, {}, bad, "duration") for bad in (math.nan, math.inf, -1.0)),
+    *((AT_REST, {"accuracy": bad}, 1.0, "accuracy") for bad in (0.0, -1.0, 9e-17, 2e-3, math.nan)),
+    *((bad, {}, 1.0, "six finite")
+      for bad in (AT_REST[:5], [math.nan, *AT_REST[1:]], [math.inf, *AT_REST[1:]], [AT_REST])),
+])
+def test_what_is_outside_is_refused(state: Any, options: dict[str, float], duration: float, words: str) -> None:
+    with pytest.raises(Refused, match=words):
+        Integrator(system_of(make_grasp(), np.array(state)), continuous=True, **options).advance(duration)
 
 
 EVERYTHING = """
@@ -191,13 +185,11 @@ def test_everything_runs_uncompiled() -> None:
 
 
 @pytest.mark.parametrize("mass", [1.0, 1e-4, 1e-8, 1e-12])
-@pytest.mark.parametrize("body", ["left_arm", "right_arm"])
-def test_outputs_of_an_arm_without_inertia_are_its_creep(mass: float, body: str) -> None:
+@pytest.mark.parametrize("name", ["left_arm", "right_arm"])
+def test_outputs_of_an_arm_without_inertia_are_its_creep(mass: float, name: str) -> None:
     """The product of c/m and the time is large."""
-    arm = {"mass_kg": mass, "stiffness_N_per_m": 10.0, "damping_Ns_per_m": 1e3, "position_m": -0.3,
-           "velocity_m_per_s": 0.0}
-    scene = scenes.compose("creep", {body: arm, "time": {"duration_s": 1.0, "control_period_s": 0.001}})
-    run = simulate(scene, grid=np.linspace(0.0, 1.0, 9))
+    arm = body(mass, -0.3, stiffness_N_per_m=10.0, damping_Ns_per_m=1e3)
+    run = simulate(made(1.0, 0.001, **{name: arm}), grid=np.linspace(0.0, 1.0, 9))
     slow = 0.02 / (1.0 + np.sqrt(1.0 - 4e-5 * mass))  # 1/s; the fast part is over
     creep = -0.3 * np.exp(-slow * run.t[1:]) / (1.0 - mass * slow**2 / 10.0)
-    assert run.state[1:, 0 if body == "left_arm" else 4] == pytest.approx(creep, rel=1e-14)
+    assert run.state[1:, 0 if name == "left_arm" else 4] == pytest.approx(creep, rel=1e-14)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from documents import horizon
+from documents import body, horizon, made
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator
@@ -34,12 +34,8 @@ def test_what_rests_is_where_its_forces_balance_and_costs_nothing_more(name: str
 
 @pytest.mark.parametrize("place", [0.0, 1e-12, 0.001])
 def test_a_motion_that_begins_with_little_energy_comes_to_rest(place: float) -> None:
-    scene = scenes.compose("slope", {
-        "time": {"duration_s": 100.0, "control_period_s": 0.1}, "tilt": {"angle_rad": 0.2, "gravity_m_per_s2": 9.81},
-        "left_arm": {"mass_kg": 1.0, "position_m": place, "velocity_m_per_s": 0.0, "stiffness_N_per_m": 100.0,
-                     "damping_Ns_per_m": 10.0},
-    })
-    run = simulate(scene)
+    run = simulate(made(100.0, 0.1, tilt={"angle_rad": 0.2, "gravity_m_per_s2": 9.81},
+                        left_arm=body(x=place, stiffness_N_per_m=100.0, damping_Ns_per_m=10.0)))
     assert run.at_rest is not None
     assert 4.0 < run.at_rest < 20.0
     assert run.state[-1, 0] == pytest.approx(-9.81 * math.sin(0.2) / 100.0, rel=1e-15)
@@ -47,12 +43,8 @@ def test_a_motion_that_begins_with_little_energy_comes_to_rest(place: float) -> 
 
 def test_what_creeps_does_not_rest() -> None:
     """A damper that balances a spring is no rest."""
-    scene = scenes.compose("creeps", {
-        "time": {"duration_s": 1e5, "control_period_s": 100.0}, "loop": {},
-        "left_arm": {"mass_kg": 1e-12, "position_m": 1.0, "velocity_m_per_s": 0.0, "stiffness_N_per_m": 100.0,
-                     "damping_Ns_per_m": 1e10},
-        "left_feedback": {"position_gain_N_per_m": 0.0, "velocity_gain_Ns_per_m": 0.0},
-    })
+    scene = made(1e5, 100.0, loop={}, left_arm=body(1e-12, 1.0, stiffness_N_per_m=100.0, damping_Ns_per_m=1e10),
+                 left_feedback={"position_gain_N_per_m": 0.0, "velocity_gain_Ns_per_m": 0.0})
     assert simulate(scene, grid=[1e5]).state[-1, 0] == pytest.approx(math.exp(-1e-3), rel=1e-13)
 
 

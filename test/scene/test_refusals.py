@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import re
+from collections.abc import Collection
 
 import numpy as np
 import pytest
@@ -79,23 +80,14 @@ def test_every_key_is_needed_unless_it_is_optional(section: str, parameter: Para
         refused(yaml.safe_dump(changed), "dir/bad.yaml", f"{section}.{parameter.key}", "missing", "allowed")
 
 
-@pytest.mark.parametrize("key", ["title", "readings", "time"])
-def test_texts_and_time_are_needed(key: str) -> None:
-    changed = {name: value for name, value in BASE.items() if name != key}
-    refused(yaml.safe_dump(changed), "dir/bad.yaml", key, "missing", "allowed")
-
-
-@pytest.mark.parametrize(
-    ("gone", "by"),
-    [("left_arm", "left_feedback"), ("object", "left_contact"), ("right_arm", "right_feedback")],
-)
-def test_what_another_section_needs_is_needed(gone: str, by: str) -> None:
-    changed = {name: value for name, value in BASE.items() if name != gone}
-    refused(yaml.safe_dump(changed), "dir/bad.yaml", by, f"needs {gone}", "allowed")
-
-
-def test_a_scene_needs_a_body() -> None:
-    refused(yaml.safe_dump({key: BASE[key] for key in ("title", "readings", "time")}), "no body", "left_arm")
+@pytest.mark.parametrize(("gone", "words"), [
+    *(([key], [key, "missing", "allowed"]) for key in ("title", "readings", "time")),
+    *(([key], [by, f"needs {key}", "allowed"])
+      for key, by in (("left_arm", "left_feedback"), ("object", "left_contact"), ("right_arm", "right_feedback"))),
+    (BASE.keys() - {"title", "readings", "time"}, ["no body", "left_arm"]),
+])
+def test_what_is_needed_is_missed(gone: Collection[str], words: list[str]) -> None:
+    refused(yaml.safe_dump({name: value for name, value in BASE.items() if name not in gone}), "dir/bad.yaml", *words)
 
 
 @pytest.mark.parametrize(("text", "words"), [
