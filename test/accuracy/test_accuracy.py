@@ -34,7 +34,6 @@ def test_the_truth_knows_its_own_error() -> None:
 
 
 def test_a_truth_that_begins_at_0_is_known_to_roundings_of_its_way() -> None:
-    """Beside it was 5e-324 m, outside the domain."""
     thrown = ["left_arm.position_m=0", "left_arm.velocity_m_per_s=1", "time.duration_s=1"]
     moving = finest(scenes.load("hammer", thrown))
     assert 1e-17 < moving.uncertainty < 1e-13

@@ -13,19 +13,17 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from processes import GRASP, ran
 
 from grasp_ros import scene, simulation
 from grasp_ros.cli.commands import COMMANDS
-from grasp_ros.cli.parser import LONGEST
 
-GRASP = [sys.executable, "-m", "grasp_ros.cli"]
 SHORT = ("--set", "time.duration_s=1")
 
 
 def shell(program: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """A line for bash, in which $GRASP is the command."""
-    return subprocess.run(["bash", "-c", program], capture_output=True, text=True, timeout=60, check=False,
-                          env={**os.environ, "GRASP": " ".join(GRASP), **environment})
+    return ran("bash", "-c", program, env={**os.environ, "GRASP": " ".join(GRASP), **environment})
 
 
 def test_version(command: Any) -> None:
@@ -50,42 +48,6 @@ def test_help_is_there_at_once() -> None:
         return after.children_user + after.children_system - before.children_user - before.children_system
 
     assert min(seconds() for _ in range(3)) < 0.3
-
-
-@pytest.mark.parametrize(
-    ("words", "complaint"),
-    [
-        ("simulat case_01", "argument command: simulat is not allowed; did you mean simulate?"),
-        ("simulate case_01 --setting a=1", "did you mean --set?"),
-        ("simulate case_1", "case_1: no such scene; did you mean case_01 or case_10 or case_11"),
-        ("simulate case_01 --set left_contact.dissipation=1", "did you mean left_contact.dissipation_s_per_m?"),
-        ("simulate case_01 --set left_contakt={}", "did you mean left_contact?"),
-        ("simulate case_01 --method rk5", "argument --method: rk5 is not allowed; did you mean rk45?"),
-        ("simulate case_01 --set zzz.qqq=1", "no such key; allowed: time.duration_s, "),
-        ("new", "the following arguments are required: FILE.yaml"),
-    ],
-)
-def test_a_refusal_is_short_and_says_what_was_meant(command: Any, words: str, complaint: str) -> None:
-    result = command(*words.split())
-    assert result.returncode == 2
-    last = result.stderr.splitlines()[-1]
-    assert complaint in last
-    assert len(last) <= LONGEST
-
-
-@pytest.mark.parametrize(("words", "name"), [("simulate case_01 --nonsense", "grasp simulate"), ("nothing", "grasp"),
-                                             ("simulate --grid x case_01", "grasp simulate")])
-def test_arguments_are_refused_in_one_line_that_names_the_command(command: Any, words: str, name: str) -> None:
-    (line,) = command(*words.split()).stderr.splitlines()
-    assert line.startswith(f"{name}: error: ")
-
-
-def test_an_endless_key_is_refused_in_a_line(command: Any, tmp_path: Path) -> None:
-    text = scene.load("case_01").to_yaml().replace("mass_kg", "m" * 5000)
-    (tmp_path / "long.yaml").write_text(text)
-    result = command("simulate", "long.yaml")
-    assert result.returncode == 2
-    assert len(result.stderr) <= LONGEST + 1
 
 
 def test_json_of_scenes_and_methods(command: Any) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import pytest
 
 from grasp_ros.exact.contact.step_unit import higher_order, new_settings
 from grasp_ros.exact.driver.advance import advance
@@ -28,6 +29,7 @@ from grasp_ros.exact.records import (
 from grasp_ros.physics.layout import (
     LEFT,
     OBJECT,
+    RIGHT,
     Body,
     Entry,
     Filled,
@@ -44,6 +46,7 @@ from grasp_ros.physics.layout import (
 )
 from grasp_ros.physics.system import COLUMN
 
+SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
 TOLERANCE, ORDER = 1e-16, 34
 OPEN_BESIDE = (-1.0, 0.0)  # u and u' of a pair that is far from touching
 

@@ -56,10 +56,7 @@ def test_switches_against_the_reference(name: str) -> None:
     result, reference = case(name), reference_of(name, horizon_of(name))
     for side in (LEFT, RIGHT):
         begins, ends = contacts(result.integrator.events, side)
-        for found, expected in (
-            (begins, reference.touches[side]),
-            (ends, reference.releases[side]),
-        ):
+        for found, expected in ((begins, reference.touches[side]), (ends, reference.releases[side])):
             assert len(found) == len(expected)
             # a slow touch is as uncertain as position / speed; case 9 amplifies most
             assert np.abs(found - np.array([float(t) for t in expected])).max() < (1e-7 if name == "case_09" else 5e-9)

@@ -9,7 +9,7 @@ from typing import Any
 import gmpy2
 import numpy as np
 import pytest
-from exact.bench import Bench, bench, bits, drive
+from exact.bench import SIDES, Bench, bench, bits, drive
 from gmpy2 import mpfr
 from oracles import FREE, done, kinds, run
 
@@ -27,7 +27,6 @@ from lab.reference import plant as exact
 from lab.reference.grasp import Grasp
 from lab.reference.run import Run, precision
 
-SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
 PARTS = pytest.mark.parametrize("part", [1.0, 1e-2, 1e-5])
 MOTION = [V.L, V.O, V.R]
 OVERLAPS = [U.L, U.R]

@@ -7,13 +7,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from exact.bench import bench
+from exact.bench import SIDES, bench
 
 from grasp_ros.exact.compensated import add, meet, move_arm_in_contact, move_in_flight, two_sum, write_penetrations
 from grasp_ros.exact.records import Flown, State
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Pair, U, V, X
 
-SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
 STEPS, WAY = 1000, 200.4 * EPS  # each sum leaves out 0.4 of its rounding, in the same direction
 LANE: dict[int, int] = {LEFT: X.L, OBJECT: X.O, RIGHT: X.R}
 

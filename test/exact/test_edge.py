@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exact.bench import bench
+from exact.bench import SIDES, bench
 from mpmath import mp, mpf
 from oracles import FREE, flight
 
@@ -23,16 +23,14 @@ from grasp_ros.exact.automaton.edge import (
     separates,
     surface_side,
 )
-from grasp_ros.exact.automaton.modes import let_leave, make_transition
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.kinematics import difference, other
 from grasp_ros.exact.records import Deciding, Plant, State
 from grasp_ros.exact.tolerances import DERIVATIVE, SURFACE
-from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Of, Pair, Slide, Transition, U, Work, X
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Of, Pair, Slide, U, Work, X
 from grasp_ros.physics.model import Contact
 from lab.reference.grasp import Grasp, system_of
 
-SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
 Row = tuple[float, float, float, float]  # m, k, c, f
 # An arm and an object whose derivatives below an order agree; their place and velocity.
 PARTING: dict[int, tuple[Row, Row, float, float]] = {
@@ -144,7 +142,8 @@ def test_bodies_that_are_alike_never_part(side: Body) -> None:
 
 
 @SIDES
-@pytest.mark.parametrize(("u", "d", "p"), [(0.01, 0.2, 0.5), (0.01, -0.2, 0.5), (0.01, 0.3, 0.0), (0.01, -0.3, 0.0)])
+@pytest.mark.parametrize(("u", "d", "p"), [(0.01, 0.2, 0.5), (0.01, -0.2, 0.5), (0.01, 0.3, 0.0), (0.01, -0.3, 0.0),
+                                          (0.01, -2.0, 0.5)])
 def test_the_force_of_the_other_pair_and_its_rate(side: Body, u: float, d: float, p: float) -> None:
     """(6) and its derivative along the motion, in which the force itself takes part."""
     b = bench(side, 0.0, 0.0, beside=(u, d), beside_mode=Pair.CONTACT, p=p, push=0.4, beside_push=-3.0)
@@ -170,17 +169,26 @@ def test_without_force_nothing_pushes_beside(side: Body) -> None:
         assert other_push(b.plant, b.state, side) == (0.0, 0.0)
 
 
-@SIDES
-def test_the_force_of_the_other_pair_decides_with_its_value_and_its_rate(side: Body) -> None:
-    def found(**options: Any) -> Deciding:
-        b = bench(side, 0.0, 0.0, beside=(0.01, options.pop("d")), beside_mode=Pair.CONTACT, p=0.0, **options)
-        return Deciding(*deciding_derivative(b.plant, b.state, side))
+PRESSING = {"p": 0.0, "beside_mode": Pair.CONTACT}
+PUSHED = {"push": 1.0, "object_push": 1.0, "beside_push": 1.0, "stiffness": 2.0}
 
-    assert found(d=0.0) == pytest.approx((2.0, 10.0))
-    assert found(d=0.0, push=-12.0) == pytest.approx((2.0, -2.0))
-    assert found(d=0.2, push=-10.0) == pytest.approx((3.0, 1.5e4 * 0.1 * 0.2))
-    assert found(d=-0.2, push=-10.0) == pytest.approx((3.0, -1.5e4 * 0.1 * 0.2))
-    assert found(d=0.0, push=-10.0) == (UNDECIDED, 0.0)  # the second derivative of the force would decide
+
+@SIDES
+@pytest.mark.parametrize(("d", "options", "expected"), [
+    (0.0, PRESSING, (2.0, 10.0)), (0.0, {**PRESSING, "push": -12.0}, (2.0, -2.0)),
+    (0.2, {**PRESSING, "push": -10.0}, (3.0, 300.0)), (-0.2, {**PRESSING, "push": -10.0}, (3.0, -300.0)),
+    (0.0, {**PRESSING, "push": -10.0}, (UNDECIDED, 0.0)),  # the second derivative of the force would decide
+    # at u' = -1/p the force is zero; what pushes the other arm off that surface lets it grow, either way
+    *((-2.0, {"beside_mode": Pair.CONTACT, "beside_push": push}, (3.0, -5.0 * push)) for push in (-3.0, 3.0)),
+    # closed without a force, or with one soon; the fourth derivative is the first of this pair's own
+    (0.3, {**PUSHED, "beside_mode": Pair.CLAMPED}, (4.0, -2.0)),
+    (0.3, {**PUSHED, "beside_mode": Pair.BEGINNING}, (3.5, math.inf)),
+])
+def test_the_force_of_the_other_pair_decides_with_its_value_and_its_rate(
+    side: Body, d: float, options: dict[str, Any], expected: tuple[float, float]
+) -> None:
+    b = bench(side, 0.0, 0.0, beside=(0.01, d), **options)
+    assert deciding_derivative(b.plant, b.state, side) == pytest.approx(expected)
 
 
 @SIDES
@@ -192,16 +200,6 @@ def test_drag_of_the_object_lessens_what_the_force_of_the_other_pair_does(side: 
 
 
 @SIDES
-@pytest.mark.parametrize("push", [-3.0, 3.0])
-def test_a_force_that_only_begins_at_the_surface_decides_with_its_rate(side: Body, push: float) -> None:
-    """At u' = -1/p the force is zero; what pushes the other arm off that surface lets it grow, either way."""
-    b = bench(side, 0.0, 0.0, beside=(0.01, -2.0), beside_mode=Pair.CONTACT, p=0.5, beside_push=push)
-    value, pace = other_push(b.plant, b.state, side)
-    assert (value, pace) == (0.0, pytest.approx(-5.0 * push))
-    assert deciding_derivative(b.plant, b.state, side) == pytest.approx((3.0, pace))
-
-
-@SIDES
 def test_a_wall_hands_no_force_on(side: Body) -> None:
     b = bench(side, 0.0, 0.0, beside=(0.01, 0.3), beside_mode=Pair.CONTACT, slide=Slide.STUCK)
     b.plant.bodies[OBJECT, Of.MASS], b.plant.bodies[OBJECT, Of.FORCE] = math.inf, 0.0
@@ -209,22 +207,19 @@ def test_a_wall_hands_no_force_on(side: Body) -> None:
 
 
 @SIDES
-@pytest.mark.parametrize(
-    ("own", "beside", "expected"),
-    [
-        ({}, {"d": 0.3}, (3.5, math.inf)),  # its force will press this pair, with t^(3/2)
-        ({}, {"push": 1.0}, (5.0, 6.0 * 1e4 * 0.5**1.5)),  # 1e4 (t^2 / 2)^(3/2), differentiated three times
-        ({}, {"d": -0.3}, (3.5, math.inf)),
-        ({}, {}, (NEVER, 0.0)),
-        ({"push": 1.0}, {"d": 0.3}, (2.0, 1.0)),
-        ({"push": -1.0}, {"d": 0.3}, (2.0, -1.0)),
-        ({"push": 1.0}, {"push": 1.0}, (2.0, 1.0)),
-        ({"speed": 0.5, "stiffness": 2.0}, {"d": 0.3}, (3.0, -1.0)),
-        ({"speed": 0.5, "stiffness": 2.0}, {"push": 1.0}, (3.0, -1.0)),
-        ({"common": 1.0, "stiffness": 2.0}, {"d": 0.3}, (3.5, math.inf)),  # of its own: (4.0, -2.0), which is later
-        ({"common": 1.0, "stiffness": 2.0}, {"push": 1.0}, (4.0, -2.0)),
-    ],
-)
+@pytest.mark.parametrize(("own", "beside", "expected"), [
+    ({}, {"d": 0.3}, (3.5, math.inf)),  # its force will press this pair, with t^(3/2)
+    ({}, {"push": 1.0}, (5.0, 6.0 * 1e4 * 0.5**1.5)),  # 1e4 (t^2 / 2)^(3/2), differentiated three times
+    ({}, {"d": -0.3}, (3.5, math.inf)),
+    ({}, {}, (NEVER, 0.0)),
+    ({"push": 1.0}, {"d": 0.3}, (2.0, 1.0)),
+    ({"push": -1.0}, {"d": 0.3}, (2.0, -1.0)),
+    ({"push": 1.0}, {"push": 1.0}, (2.0, 1.0)),
+    ({"speed": 0.5, "stiffness": 2.0}, {"d": 0.3}, (3.0, -1.0)),
+    ({"speed": 0.5, "stiffness": 2.0}, {"push": 1.0}, (3.0, -1.0)),
+    ({"common": 1.0, "stiffness": 2.0}, {"d": 0.3}, (3.5, math.inf)),  # of its own: (4.0, -2.0), which is later
+    ({"common": 1.0, "stiffness": 2.0}, {"push": 1.0}, (4.0, -2.0)),
+])
 def test_beside_a_pair_that_begins_at_zero(
     side: Body, own: dict[str, float], beside: dict[str, float], expected: tuple[float, float]
 ) -> None:
@@ -247,15 +242,6 @@ def test_a_force_that_begins_at_the_surface_by_the_third_derivative_adds_to_the_
     b.plant.bodies[far, Of.STIFFNESS] = 0.8
     b.plant.bodies[far, Of.FORCE] += 0.8 * b.state.y[lane]
     assert deciding_derivative(b.plant, b.state, side) == pytest.approx((4.0, expected))
-
-
-@SIDES
-@pytest.mark.parametrize(("mode", "expected"), [(Pair.CLAMPED, (4.0, -2.0)), (Pair.BEGINNING, (3.5, math.inf))])
-def test_a_pair_that_is_closed_without_a_force(side: Body, mode: Pair, expected: tuple[float, float]) -> None:
-    """It has none at all, or is going to have one soon; the fourth derivative is the first of this pair's own."""
-    b = bench(side, 0.0, 0.0, beside=(0.01, 0.3), beside_mode=mode, push=1.0, object_push=1.0, beside_push=1.0,
-              stiffness=2.0)
-    assert deciding_derivative(b.plant, b.state, side) == pytest.approx(expected)
 
 
 # How long the sign is certain.
@@ -364,15 +350,6 @@ def test_a_feedback_that_drives_makes_no_time_longer() -> None:
 
 
 @SIDES
-@pytest.mark.parametrize("mode", list(Pair))
-def test_only_a_pair_that_leaves_is_turned_back(side: Body, mode: Pair) -> None:
-    b = bench(side, 0.0, 0.3, Pair.OPEN, beside=(0.01, -2.0), beside_mode=mode)
-    make_transition(b.plant, b.state, side, Transition.TOUCH, False, b.out)
-    assert b.mode(side) is Pair.CONTACT
-    assert b.mode(other(side)) is (Pair.CONTACT if mode is Pair.LEAVING else mode)
-
-
-@SIDES
 @pytest.mark.parametrize(("u", "d", "options", "expected"), [
     (0.01, -1.0, {}, True), (0.0, -1.0, {}, True), (0.01, 1.0, {"push": 9.0}, False), (0.01, 0.0, {}, False),
     (0.01, -1.0, {"push": 4.9}, True), (0.01, -1.0, {"push": 5.1}, False),  # 20 u |u''| beside u'^2
@@ -457,24 +434,6 @@ def test_beyond_the_third_derivative_only_bodies_without_an_impact_beside_are_kn
 def test_a_pair_has_glided_at_the_surface_alone(side: Body, d: float, options: dict[str, Any], expected: bool) -> None:
     b = bench(side, 0.01, d, Pair.CONTACT, **options)
     assert bool(has_glided(b.plant, b.state, side, SURFACE)) is expected
-
-
-@SIDES
-@pytest.mark.parametrize(("d", "options", "expected"), [
-    (-2.0, {}, Pair.LEAVING), (-1.0, {}, Pair.CONTACT), (-2.0, {"push": 1.0}, Pair.CONTACT)])
-def test_a_pair_in_contact_leaves_where_nothing_moves_it(side: Body, d: float, options: dict[str, Any], expected: Pair
-                                                         ) -> None:
-    b = bench(side, 0.01, d, Pair.CONTACT, **options)
-    let_leave(b.plant, b.state, b.settings)
-    assert (b.mode(side), b.mode(other(side)), b.events) == (expected, Pair.OPEN, [])
-
-
-@SIDES
-@pytest.mark.parametrize("mode", [mode for mode in Pair if mode not in (Pair.CONTACT, Pair.LEAVING)])
-def test_only_a_pair_in_contact_leaves(side: Body, mode: Pair) -> None:
-    b = bench(side, 0.01, -2.0, mode)
-    let_leave(b.plant, b.state, b.settings)
-    assert b.mode(side) is mode
 
 
 @pytest.mark.parametrize(("p", "masses", "state"), [

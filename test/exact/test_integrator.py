@@ -13,6 +13,7 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
+from documents import body, made
 from numba.core.registry import CPUDispatcher
 from oracles import AT_REST, CASES, Run, done, energy, kinds, make_grasp, run
 
@@ -22,6 +23,7 @@ from grasp_ros.exact.driver.callback import SIGNATURE
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.observe.observer import observe, watch
 from grasp_ros.observe.record import Wanted
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import Work
 from grasp_ros.simulation import ensemble, simulate
 from grasp_ros.simulation.chunk import Setup
@@ -41,14 +43,6 @@ def test_every_accuracy_gets_through_every_case(name: str, accuracy: float) -> N
     assert len(result.states) == len(GRID)
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_repaired_v_never_rises(name: str) -> None:
-    scene = scenes.load(name)
-    V_c = energy(grasp_of(scene), run(grasp_of(scene), scene.initial_state, 20.0, np.linspace(0, 20, 4001)).states).V_c
-    assert np.diff(V_c).max() <= 1e-12 * V_c[0]
-    assert V_c[-1] < V_c[0] or name == "case_02"
-
-
 @pytest.mark.parametrize("name", [name for name in CASES if name not in ("case_01", "case_09", "case_10")])
 def test_the_decaying_tail_ends_properly(name: str) -> None:
     result = run(grasp_of(scenes.load(name)), scenes.load(name).initial_state, 1000.0, [500.0, 1000.0])
@@ -63,11 +57,10 @@ def test_the_first_output_is_the_start(start: Any) -> None:
     assert np.array_equal(run(make_grasp(), start, 0.1, [0.0, 0.1]).states[0], start)
 
 
-def test_the_first_and_the_last_output_are_start_and_end() -> None:
+def test_the_last_output_is_the_end() -> None:
     scene = scenes.load("case_03")
     dense = run(grasp_of(scene), scene.initial_state, 20.0, np.linspace(0.0, 20.0, 9001))
     assert np.array_equal(dense.states[-1], dense.integrator.state)
-    assert np.array_equal(dense.states[0], scene.initial_state)
 
 
 @pytest.mark.parametrize("name", ["case_01", "case_05", "case_09"])
@@ -83,13 +76,6 @@ def test_splitting_one_horizon_changes_nothing(name: str, pieces: int) -> None:
     assert np.abs(parts.state - whole.integrator.state).max() < 2e-11
     for a, b in zip(parts.events, whole.integrator.events, strict=True):
         assert a.time == pytest.approx(b.time, abs=2e-11)
-
-
-def test_repeated_and_empty_output_times() -> None:
-    scene = scenes.load("case_01")
-    result = run(grasp_of(scene), scene.initial_state, 1.0, [0.0, 0.0, 0.45, 0.45, 1.0, 1.0])
-    assert np.array_equal(result.states[::2], result.states[1::2])
-    assert run(grasp_of(scene), scene.initial_state, 1.0, []).states.shape == (0, 6)
 
 
 def test_advance_by_nothing_changes_nothing() -> None:
@@ -143,15 +129,6 @@ def test_whatever_numbers_and_arrays_are_given_run_on_the_same_machine_code(grid
     assert observe.nopython_signatures == [SIGNATURE]  # as it is on disk, whoever calls it first
 
 
-def test_event_budget_stops_with_its_status() -> None:
-    scene = scenes.load("case_01")
-    for budget in (0, 1, 10):
-        result = run(grasp_of(scene), scene.initial_state, 20.0, GRID, max_events=budget)
-        assert result.integrator.status is Status.EVENT_BUDGET, budget
-        assert len(result.integrator.events) <= budget + 2
-        assert len(result.states) < len(GRID)
-
-
 def test_event_budget_beyond_the_kernel_rows() -> None:
     scene = scenes.load("case_02")
     result = run(grasp_of(scene), scene.initial_state, 5000.0, np.linspace(0, 5000, 501), max_events=2000)
@@ -162,22 +139,15 @@ def test_event_budget_beyond_the_kernel_rows() -> None:
     assert again.shape == (0, 6)
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -1.0])
-def test_bad_durations_are_refused(bad: float) -> None:
-    with pytest.raises(ValueError, match="duration"):
-        Integrator(system_of(make_grasp(), np.array(AT_REST)), continuous=True).advance(bad)
-
-
-@pytest.mark.parametrize("state", [AT_REST[:5], [math.nan, *AT_REST[1:]], [math.inf, *AT_REST[1:]], [AT_REST]])
-def test_bad_states_are_refused(state: Any) -> None:
-    with pytest.raises(ValueError, match="six finite"):
-        Integrator(system_of(make_grasp(), np.array(state)), continuous=True)
-
-
-@pytest.mark.parametrize("accuracy", [0.0, -1.0, 9e-17, 2e-3, math.nan])
-def test_bad_accuracies_are_refused(accuracy: float) -> None:
-    with pytest.raises(ValueError, match="accuracy"):
-        Integrator(system_of(make_grasp(), np.array(AT_REST)), continuous=True, accuracy=accuracy)
+@pytest.mark.parametrize(("state", "options", "duration", "words"), [
+    *((AT_REST, {}, bad, "duration") for bad in (math.nan, math.inf, -1.0)),
+    *((AT_REST, {"accuracy": bad}, 1.0, "accuracy") for bad in (0.0, -1.0, 9e-17, 2e-3, math.nan)),
+    *((bad, {}, 1.0, "six finite")
+      for bad in (AT_REST[:5], [math.nan, *AT_REST[1:]], [math.inf, *AT_REST[1:]], [AT_REST])),
+])
+def test_what_is_outside_is_refused(state: Any, options: dict[str, float], duration: float, words: str) -> None:
+    with pytest.raises(Refused, match=words):
+        Integrator(system_of(make_grasp(), np.array(state)), continuous=True, **options).advance(duration)
 
 
 EVERYTHING = """
@@ -215,13 +185,11 @@ def test_everything_runs_uncompiled() -> None:
 
 
 @pytest.mark.parametrize("mass", [1.0, 1e-4, 1e-8, 1e-12])
-@pytest.mark.parametrize("body", ["left_arm", "right_arm"])
-def test_outputs_of_an_arm_without_inertia_are_its_creep(mass: float, body: str) -> None:
+@pytest.mark.parametrize("name", ["left_arm", "right_arm"])
+def test_outputs_of_an_arm_without_inertia_are_its_creep(mass: float, name: str) -> None:
     """The product of c/m and the time is large."""
-    arm = {"mass_kg": mass, "stiffness_N_per_m": 10.0, "damping_Ns_per_m": 1e3, "position_m": -0.3,
-           "velocity_m_per_s": 0.0}
-    scene = scenes.compose("creep", {body: arm, "time": {"duration_s": 1.0, "control_period_s": 0.001}})
-    run = simulate(scene, grid=np.linspace(0.0, 1.0, 9))
+    arm = body(mass, -0.3, stiffness_N_per_m=10.0, damping_Ns_per_m=1e3)
+    run = simulate(made(1.0, 0.001, **{name: arm}), grid=np.linspace(0.0, 1.0, 9))
     slow = 0.02 / (1.0 + np.sqrt(1.0 - 4e-5 * mass))  # 1/s; the fast part is over
     creep = -0.3 * np.exp(-slow * run.t[1:]) / (1.0 - mass * slow**2 / 10.0)
-    assert run.state[1:, 0 if body == "left_arm" else 4] == pytest.approx(creep, rel=1e-14)
+    assert run.state[1:, 0 if name == "left_arm" else 4] == pytest.approx(creep, rel=1e-14)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exact.bench import TOLERANCE, Bench, bench, bits
+from exact.bench import SIDES, TOLERANCE, Bench, bench, bits
 
 from grasp_ros.exact.automaton.friction import apply_friction, since_certain
 from grasp_ros.exact.automaton.modes import (
@@ -33,7 +33,6 @@ from grasp_ros.exact.records import Candidate, Ends, Tables
 from grasp_ros.exact.tolerances import LEFT_OUT
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, Slide, Transition, U, V, X
 
-SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
 NEVER = Candidate(math.inf, Transition.TOUCH)
 NO_SLIDE = Candidate(math.inf, Slide.FREE)
 
@@ -48,17 +47,14 @@ def toward(side: Body, slide: Slide) -> Slide:
 
 
 @SIDES
-@pytest.mark.parametrize(
-    ("kind", "before", "after", "u", "d", "u_after"),
-    [
-        (Transition.TOUCH, Pair.OPEN, Pair.CONTACT, 1e-17, 0.3, 0.0),
-        (Transition.RELEASE, Pair.CONTACT, Pair.OPEN, -1e-17, -0.3, 0.0),
-        (Transition.RELEASE, Pair.CLAMPED, Pair.OPEN, 1e-17, -3.0, 0.0),
-        (Transition.RELEASE, Pair.LEAVING, Pair.OPEN, 1e-17, -0.3, 0.0),
-        (Transition.CLAMP, Pair.CONTACT, Pair.CLAMPED, 0.01, -2.0, 0.01),
-        (Transition.REENTRY, Pair.CLAMPED, Pair.CONTACT, 0.01, -2.0, 0.01),
-    ],
-)
+@pytest.mark.parametrize(("kind", "before", "after", "u", "d", "u_after"), [
+    (Transition.TOUCH, Pair.OPEN, Pair.CONTACT, 1e-17, 0.3, 0.0),
+    (Transition.RELEASE, Pair.CONTACT, Pair.OPEN, -1e-17, -0.3, 0.0),
+    (Transition.RELEASE, Pair.CLAMPED, Pair.OPEN, 1e-17, -3.0, 0.0),
+    (Transition.RELEASE, Pair.LEAVING, Pair.OPEN, 1e-17, -0.3, 0.0),
+    (Transition.CLAMP, Pair.CONTACT, Pair.CLAMPED, 0.01, -2.0, 0.01),
+    (Transition.REENTRY, Pair.CLAMPED, Pair.CONTACT, 0.01, -2.0, 0.01),
+])
 def test_arrow(side: Body, kind: Transition, before: Pair, after: Pair, u: float, d: float, u_after: float) -> None:
     b = bench(side, u, d, before, beside=(0.2, 0.1), beside_mode=Pair.CONTACT)
     make_transition(b.plant, b.state, side, kind, False, b.out)
@@ -80,11 +76,18 @@ def clamp(b: Bench, side: Body, at: float = 1.0) -> None:
 
 
 @SIDES
-@pytest.mark.parametrize("beside_mode", [Pair.OPEN, Pair.LEAVING, Pair.RESTING, Pair.ABSENT])
-def test_a_pair_that_glides_on_the_surface_leaves_without_an_event(side: Body, beside_mode: Pair) -> None:
-    b = bench(side, 0.01, -2.0, Pair.CONTACT, beside_mode=beside_mode)
+@pytest.mark.parametrize(("beside_mode", "options", "expected"), [
+    *((mode, {}, Pair.LEAVING) for mode in (Pair.OPEN, Pair.LEAVING, Pair.RESTING, Pair.ABSENT)),
+    *((Pair.OPEN, options, Pair.CLAMPED)
+      for options in ({"push": -1.0}, {"push": 1e-9}, {"stiffness": 1e-3}, {"object_push": 1.0})),
+])
+def test_a_pair_on_the_surface_clamps_if_something_moves_it_and_leaves_without_an_event_otherwise(
+    side: Body, beside_mode: Pair, options: dict[str, Any], expected: Pair
+) -> None:
+    b = bench(side, 0.01, -2.0, Pair.CONTACT, beside_mode=beside_mode, **options)
     clamp(b, side)
-    assert (b.mode(side), b.events) == (Pair.LEAVING, [])
+    assert b.mode(side) is expected
+    assert b.events == ([(side, Transition.CLAMP)] if expected is Pair.CLAMPED else [])
 
 
 @SIDES
@@ -98,23 +101,15 @@ def test_pairs_that_glide_leave_alike(side: Body) -> None:
 
 
 @SIDES
-@pytest.mark.parametrize("options", [{"push": -1.0}, {"push": 1e-9}, {"stiffness": 1e-3}, {"object_push": 1.0}])
-def test_a_pair_that_something_moves_clamps(side: Body, options: dict[str, float]) -> None:
-    b = bench(side, 0.01, -2.0, Pair.CONTACT, **options)  # type: ignore[arg-type]
-    clamp(b, side)
-    assert (b.mode(side), b.events) == (Pair.CLAMPED, [(side, Transition.CLAMP)])
-
-
-@SIDES
-@pytest.mark.parametrize(
-    ("kind", "beside_mode", "after"),
-    [(Transition.TOUCH, Pair.LEAVING, Pair.CONTACT), (Transition.TOUCH, Pair.CLAMPED, Pair.CLAMPED),
-     (Transition.RELEASE, Pair.LEAVING, Pair.LEAVING)],
-)
-def test_a_touch_turns_back_a_pair_that_leaves(side: Body, kind: Transition, beside_mode: Pair, after: Pair) -> None:
-    b = bench(side, 0.0, 0.3, beside=(0.01, -2.0), beside_mode=beside_mode)
+@pytest.mark.parametrize(("kind", "mode"), [
+    *((Transition.TOUCH, mode) for mode in Pair), (Transition.RELEASE, Pair.LEAVING),
+])
+def test_only_a_touch_turns_back_a_pair_and_only_one_that_leaves(side: Body, kind: Transition, mode: Pair) -> None:
+    b = bench(side, 0.0, 0.3, beside=(0.01, -2.0), beside_mode=mode)
     make_transition(b.plant, b.state, side, kind, False, b.out)
-    assert (b.mode(other(side)), b.events) == (after, [(side, kind)])
+    turned = kind is Transition.TOUCH and mode is Pair.LEAVING
+    assert b.mode(other(side)) is (Pair.CONTACT if turned else mode)
+    assert b.events == [(side, kind)]
 
 
 @SIDES
@@ -205,22 +200,19 @@ def test_a_push_is_certain_since_it_exceeds_its_rounding_or_from_the_begin(
 
 
 @SIDES
-@pytest.mark.parametrize(
-    ("u", "d", "p", "expected"),
-    [
-        (-1e-3, 5.0, 0.5, Pair.OPEN),
-        (-1e-3, -5.0, 0.5, Pair.OPEN),
-        (-5e-324, 0.4, 0.5, Pair.OPEN),
-        (1e-3, 5.0, 0.5, Pair.CONTACT),
-        (1e-3, -1.9, 0.5, Pair.CONTACT),
-        (1e-3, -2.0, 0.5, Pair.CONTACT),  # u' = -1/p for ever belongs to the contact, (10)
-        (1e-3, -2.0000001, 0.5, Pair.CLAMPED),
-        (1e-3, -1e9, 0.0, Pair.CONTACT),  # p = 0: there is no second surface
-        (0.0, 0.4, 0.5, Pair.CONTACT),
-        (0.0, -0.4, 0.5, Pair.OPEN),
-        (0.0, -4.0, 0.5, Pair.OPEN),
-    ],
-)
+@pytest.mark.parametrize(("u", "d", "p", "expected"), [
+    (-1e-3, 5.0, 0.5, Pair.OPEN),
+    (-1e-3, -5.0, 0.5, Pair.OPEN),
+    (-5e-324, 0.4, 0.5, Pair.OPEN),
+    (1e-3, 5.0, 0.5, Pair.CONTACT),
+    (1e-3, -1.9, 0.5, Pair.CONTACT),
+    (1e-3, -2.0, 0.5, Pair.CONTACT),  # u' = -1/p for ever belongs to the contact, (10)
+    (1e-3, -2.0000001, 0.5, Pair.CLAMPED),
+    (1e-3, -1e9, 0.0, Pair.CONTACT),  # p = 0: there is no second surface
+    (0.0, 0.4, 0.5, Pair.CONTACT),
+    (0.0, -0.4, 0.5, Pair.OPEN),
+    (0.0, -4.0, 0.5, Pair.OPEN),
+])
 def test_the_mode_follows_from_the_state(side: Body, u: float, d: float, p: float, expected: Pair) -> None:
     for beside_mode in (Pair.OPEN, Pair.CONTACT):
         b = bench(side, u, d, p=p, beside_mode=beside_mode)
@@ -239,20 +231,17 @@ PRESSING = {"beside": (0.01, 0.0), "beside_mode": Pair.CONTACT}  # 10 N towards 
 
 
 @SIDES
-@pytest.mark.parametrize(
-    ("speed", "options", "expected"),
-    [
-        (-2.0, {"push": 1.0}, Pair.CONTACT),
-        (-2.0, {"push": -1.0}, Pair.CLAMPED),
-        (-2.0, {"push": 1.0, "object_push": 2.0}, Pair.CLAMPED),
-        (-2.0, {"push": -1.0, **PRESSING}, Pair.CONTACT),
-        (-2.0, {"push": -11.0, **PRESSING}, Pair.CLAMPED),
-        (math.nextafter(-2.0, 0.0), {"push": -1.0}, Pair.CLAMPED),  # within rounding the speed decides nothing
-        (math.nextafter(-2.0, -9.0), {"push": 1.0}, Pair.CONTACT),
-        (-2.0 + 1e-14, {"push": -1.0}, Pair.CONTACT),
-        (-2.0 - 1e-14, {"push": 1.0}, Pair.CLAMPED),
-    ],
-)
+@pytest.mark.parametrize(("speed", "options", "expected"), [
+    (-2.0, {"push": 1.0}, Pair.CONTACT),
+    (-2.0, {"push": -1.0}, Pair.CLAMPED),
+    (-2.0, {"push": 1.0, "object_push": 2.0}, Pair.CLAMPED),
+    (-2.0, {"push": -1.0, **PRESSING}, Pair.CONTACT),
+    (-2.0, {"push": -11.0, **PRESSING}, Pair.CLAMPED),
+    (math.nextafter(-2.0, 0.0), {"push": -1.0}, Pair.CLAMPED),  # within rounding the speed decides nothing
+    (math.nextafter(-2.0, -9.0), {"push": 1.0}, Pair.CONTACT),
+    (-2.0 + 1e-14, {"push": -1.0}, Pair.CONTACT),
+    (-2.0 - 1e-14, {"push": 1.0}, Pair.CLAMPED),
+])
 def test_on_the_surface_what_moves_u_rate_decides(
     side: Body, speed: float, options: dict[str, Any], expected: Pair
 ) -> None:
@@ -267,33 +256,30 @@ def test_the_rounding_on_the_surface_is_that_of_the_velocities() -> None:
 
 
 @SIDES
-@pytest.mark.parametrize(
-    ("options", "expected"),
-    [
-        ({"push": 1.0}, Pair.CONTACT),  # pressed together
-        ({"push": 1.0, "object_push": 0.5}, Pair.CONTACT),
-        ({"object_push": -1.0}, Pair.CONTACT),
-        ({"push": -1.0}, Pair.OPEN),  # pulled apart
-        ({"push": 0.5, "object_push": 1.0}, Pair.OPEN),
-        ({}, Pair.RESTING),  # nothing differs
-        ({"push": 1.0, "object_push": 1.0}, Pair.RESTING),
-        ({"object_speed": 0.3, "stiffness": 2.0}, Pair.OPEN),  # order 3: the spring brakes the arm
-        ({"object_speed": -0.3, "stiffness": 2.0}, Pair.CONTACT),
-        ({"push": 1.0, "object_push": 1.0, "stiffness": 2.0}, Pair.OPEN),  # order 4
-        ({"push": -1.0, "object_push": -1.0, "stiffness": 2.0}, Pair.CONTACT),
-        ({**PRESSING}, Pair.CONTACT),  # the other pair presses with 10 N
-        ({"push": -9.0, **PRESSING}, Pair.CONTACT),
-        ({"push": -11.0, **PRESSING}, Pair.OPEN),
-        ({"push": -10.0, "p": 0.0, "beside": (0.01, 0.2), "beside_mode": Pair.CONTACT}, Pair.CONTACT),  # ever more
-        ({"push": -10.0, "p": 0.0, "beside": (0.01, -0.2), "beside_mode": Pair.CONTACT}, Pair.OPEN),
-        ({"beside": (0.01, -9.0), "beside_mode": Pair.CLAMPED}, Pair.RESTING),  # no force
-        ({"beside": (0.0, 0.3), "beside_mode": Pair.CONTACT}, Pair.CONTACT),  # it has just touched: order 3.5
-        ({"push": -1.0, "beside": (0.0, 0.3), "beside_mode": Pair.CONTACT}, Pair.OPEN),  # order 2 comes before
-        ({"object_speed": 0.3, "stiffness": 2.0, "beside": (0.0, 0.3), "beside_mode": Pair.CONTACT}, Pair.OPEN),
-        ({"push": 1.0, "object_push": 1.0, "stiffness": 2.0, "beside": (0.0, 0.3), "beside_mode": Pair.CONTACT},
-         Pair.CONTACT),  # order 4 is its own, and comes behind order 3.5
-    ],
-)
+@pytest.mark.parametrize(("options", "expected"), [
+    ({"push": 1.0}, Pair.CONTACT),  # pressed together
+    ({"push": 1.0, "object_push": 0.5}, Pair.CONTACT),
+    ({"object_push": -1.0}, Pair.CONTACT),
+    ({"push": -1.0}, Pair.OPEN),  # pulled apart
+    ({"push": 0.5, "object_push": 1.0}, Pair.OPEN),
+    ({}, Pair.RESTING),  # nothing differs
+    ({"push": 1.0, "object_push": 1.0}, Pair.RESTING),
+    ({"object_speed": 0.3, "stiffness": 2.0}, Pair.OPEN),  # order 3: the spring brakes the arm
+    ({"object_speed": -0.3, "stiffness": 2.0}, Pair.CONTACT),
+    ({"push": 1.0, "object_push": 1.0, "stiffness": 2.0}, Pair.OPEN),  # order 4
+    ({"push": -1.0, "object_push": -1.0, "stiffness": 2.0}, Pair.CONTACT),
+    ({**PRESSING}, Pair.CONTACT),  # the other pair presses with 10 N
+    ({"push": -9.0, **PRESSING}, Pair.CONTACT),
+    ({"push": -11.0, **PRESSING}, Pair.OPEN),
+    ({"push": -10.0, "p": 0.0, "beside": (0.01, 0.2), "beside_mode": Pair.CONTACT}, Pair.CONTACT),  # ever more
+    ({"push": -10.0, "p": 0.0, "beside": (0.01, -0.2), "beside_mode": Pair.CONTACT}, Pair.OPEN),
+    ({"beside": (0.01, -9.0), "beside_mode": Pair.CLAMPED}, Pair.RESTING),  # no force
+    ({"beside": (0.0, 0.3), "beside_mode": Pair.CONTACT}, Pair.CONTACT),  # it has just touched: order 3.5
+    ({"push": -1.0, "beside": (0.0, 0.3), "beside_mode": Pair.CONTACT}, Pair.OPEN),  # order 2 comes before
+    ({"object_speed": 0.3, "stiffness": 2.0, "beside": (0.0, 0.3), "beside_mode": Pair.CONTACT}, Pair.OPEN),
+    ({"push": 1.0, "object_push": 1.0, "stiffness": 2.0, "beside": (0.0, 0.3), "beside_mode": Pair.CONTACT},
+     Pair.CONTACT),  # order 4 is its own, and comes behind order 3.5
+])
 def test_at_rest_at_zero_the_first_derivative_that_differs_decides(
     side: Body, options: dict[str, Any], expected: Pair
 ) -> None:
@@ -310,47 +296,35 @@ def test_a_pair_at_rest_on_a_stuck_object_feels_its_own_arm_alone(side: Body) ->
 
 
 @SIDES
-def test_initial_modes_of_a_chain(side: Body) -> None:
-    """A pair at rest at u = 0 on which nothing acts follows the other one, whichever side is judged first."""
-    for rate, beside, expected in (
-        (0.4, Pair.CONTACT, Pair.CONTACT), (-0.4, Pair.OPEN, Pair.RESTING), (0.0, Pair.RESTING, Pair.RESTING)
-    ):
-        b = bench(side, 0.0, 0.0, beside=(0.0, rate))
-        initial_modes(b.plant, b.state)
-        assert (b.mode(side), b.mode(other(side))) == (expected, beside)
-
-
-@SIDES
-def test_initial_modes_of_a_pair_that_is_pressed_against_a_resting_one(side: Body) -> None:
-    b = bench(side, 0.0, 0.0, beside=(0.0, 0.0), push=1.0)
+@pytest.mark.parametrize(("own", "beside", "push", "expected"), [
+    ((0.0, 0.0), (0.0, 0.4), 0.0, (Pair.CONTACT, Pair.CONTACT)),  # at rest it follows the other one
+    ((0.0, 0.0), (0.0, -0.4), 0.0, (Pair.RESTING, Pair.OPEN)),
+    ((0.0, 0.0), (0.0, 0.0), 0.0, (Pair.RESTING, Pair.RESTING)),
+    ((0.0, 0.0), (0.0, 0.0), 1.0, (Pair.CONTACT, Pair.CONTACT)),
+    ((0.0, 0.0), (0.0, 0.0), -1.0, (Pair.OPEN, Pair.RESTING)),
+    ((-0.1, 0.0), (0.05, 0.2), 0.0, (Pair.OPEN, Pair.CONTACT)),
+    ((0.1, 0.0), (0.05, 0.2), 0.0, (Pair.CONTACT, Pair.CONTACT)),
+    ((0.1, -9.0), (0.05, 0.2), 0.0, (Pair.CLAMPED, Pair.CONTACT)),
+])
+def test_initial_modes_of_two_pairs(
+    side: Body, own: tuple[float, float], beside: tuple[float, float], push: float, expected: tuple[Pair, Pair]
+) -> None:
+    """Whichever side is judged first."""
+    b = bench(side, *own, beside=beside, push=push)
     initial_modes(b.plant, b.state)
-    assert (b.mode(side), b.mode(other(side))) == (Pair.CONTACT, Pair.CONTACT)
-    b = bench(side, 0.0, 0.0, beside=(0.0, 0.0), push=-1.0)
-    initial_modes(b.plant, b.state)
-    assert (b.mode(side), b.mode(other(side))) == (Pair.OPEN, Pair.RESTING)
-
-
-@SIDES
-def test_initial_modes_leave_a_decided_pair_alone(side: Body) -> None:
-    for u, d, expected in ((-0.1, 0.0, Pair.OPEN), (0.1, 0.0, Pair.CONTACT), (0.1, -9.0, Pair.CLAMPED)):
-        b = bench(side, u, d, beside=(0.05, 0.2))
-        initial_modes(b.plant, b.state)
-        assert (b.mode(side), b.mode(other(side))) == (expected, Pair.CONTACT)
+    assert (b.mode(side), b.mode(other(side))) == expected
 
 
 # The object under dry friction.
 
 
 @SIDES
-@pytest.mark.parametrize(
-    ("speed", "push", "expected"),
-    [
-        (0.1, 0.0, Slide.RIGHTWARD), (0.1, -9.0, Slide.RIGHTWARD), (-0.1, 0.0, Slide.LEFTWARD),
-        (0.0, 0.0, Slide.STUCK), (0.0, 5.0, Slide.STUCK), (0.0, -5.0, Slide.STUCK),
-        (0.0, 5.0 + 1e-14, Slide.STUCK), (0.0, -5.0 - 1e-14, Slide.STUCK),  # within rounding
-        (0.0, 5.0 + 1e-12, Slide.RIGHTWARD), (0.0, -5.0 - 1e-12, Slide.LEFTWARD),
-    ],
-)
+@pytest.mark.parametrize(("speed", "push", "expected"), [
+    (0.1, 0.0, Slide.RIGHTWARD), (0.1, -9.0, Slide.RIGHTWARD), (-0.1, 0.0, Slide.LEFTWARD),
+    (0.0, 0.0, Slide.STUCK), (0.0, 5.0, Slide.STUCK), (0.0, -5.0, Slide.STUCK),
+    (0.0, 5.0 + 1e-14, Slide.STUCK), (0.0, -5.0 - 1e-14, Slide.STUCK),  # within rounding
+    (0.0, 5.0 + 1e-12, Slide.RIGHTWARD), (0.0, -5.0 - 1e-12, Slide.LEFTWARD),
+])
 def test_the_slide_follows_from_the_state(side: Body, speed: float, push: float, expected: Slide) -> None:
     b = bench(side, -1.0, 0.0, coulomb=5.0, object_speed=speed, object_push=push)
     initial_slide(b.plant, b.state)
@@ -382,43 +356,28 @@ def test_without_dry_friction_the_object_is_free() -> None:
 
 
 @SIDES
-def test_stick(side: Body) -> None:
-    b = bench(side, -1.0, 0.0, coulomb=5.0, slide=toward(side, Slide.RIGHTWARD), object_speed=1e-17, object_push=4.0)
-    make_slide_transition(b.plant, b.state, Slide.STUCK, b.out)
-    assert b.slide is Slide.STUCK
+@pytest.mark.parametrize(("before", "push", "to", "after", "event"), [
+    (Slide.RIGHTWARD, 4.0, Slide.STUCK, Slide.STUCK, Transition.STICK),
+    (Slide.RIGHTWARD, -6.0, Slide.STUCK, Slide.LEFTWARD, None),  # it turns without a rest
+    (Slide.STUCK, -5.5, Slide.LEFTWARD, Slide.LEFTWARD, Transition.SLIP),
+    (Slide.STUCK, -5.0 * (1.0 - 1e-9), Slide.LEFTWARD, Slide.STUCK, None),  # the series foresaw it too early
+])
+def test_a_slide_begins_and_ends_as_its_force_says(
+    side: Body, before: Slide, push: float, to: Slide, after: Slide, event: Transition | None
+) -> None:
+    """5 N of friction; a series has the error of the accuracy."""
+    to, after = (own if own is Slide.STUCK else toward(side, own) for own in (to, after))
+    if before is Slide.STUCK:
+        b = bench(side, -1.0, 0.0, coulomb=5.0, slide=before, object_push=push)
+        b.plant.bodies[OBJECT, Of.MASS] = math.inf
+    else:
+        b = bench(side, -1.0, 0.0, coulomb=5.0, slide=toward(side, before), object_push=push, object_speed=1e-17)
+    make_slide_transition(b.plant, b.state, to, b.out)
+    assert b.slide is after
     assert b.state.y[V.O] == 0.0
-    assert b.plant.bodies[OBJECT, Of.MASS] == math.inf
-    assert b.events == [(OBJECT, Transition.STICK)]
-
-
-@SIDES
-def test_slip(side: Body) -> None:
-    following = toward(side, Slide.LEFTWARD)
-    b = bench(side, -1.0, 0.0, coulomb=5.0, slide=Slide.STUCK, object_push=-5.5)
-    b.plant.bodies[OBJECT, Of.MASS] = math.inf
-    make_slide_transition(b.plant, b.state, following, b.out)
-    assert b.slide is following
-    assert b.plant.bodies[OBJECT, Of.MASS] == 1.0
-    assert abs(b.plant.bodies[OBJECT, Of.FORCE]) == pytest.approx(0.5)
-    assert b.events == [(OBJECT, Transition.SLIP)]
-
-
-@SIDES
-def test_a_slip_that_the_series_foresaw_too_early_is_none(side: Body) -> None:
-    """They have the error of the accuracy; it slipped and stuck at once, and slipped again."""
-    b = bench(side, -1.0, 0.0, coulomb=5.0, slide=Slide.STUCK, object_push=-5.0 * (1.0 - 1e-9))
-    b.plant.bodies[OBJECT, Of.MASS] = math.inf
-    make_slide_transition(b.plant, b.state, toward(side, Slide.LEFTWARD), b.out)
-    assert (b.slide, b.events, b.plant.bodies[OBJECT, Of.MASS]) == (Slide.STUCK, [], math.inf)
-
-
-@SIDES
-def test_an_object_that_turns_without_a_rest_is_no_event(side: Body) -> None:
-    b = bench(side, -1.0, 0.0, coulomb=5.0, slide=toward(side, Slide.RIGHTWARD), object_speed=1e-17, object_push=-6.0)
-    make_slide_transition(b.plant, b.state, Slide.STUCK, b.out)
-    assert b.slide is toward(side, Slide.LEFTWARD)
-    assert b.state.y[V.O] == 0.0
-    assert b.events == []
+    assert b.plant.bodies[OBJECT, Of.MASS] == (math.inf if after is Slide.STUCK else 1.0)
+    assert after is Slide.STUCK or abs(b.plant.bodies[OBJECT, Of.FORCE]) == pytest.approx(abs(push) - 5.0)
+    assert b.events == ([] if event is None else [(OBJECT, event)])
 
 
 # The begin of an interval: inputs may change.
@@ -432,84 +391,46 @@ def begin(b: Bench) -> Bench:
 
 
 @SIDES
-def test_a_run_that_starts_gets_its_modes_with_the_touch_of_a_pair_at_zero(side: Body) -> None:
-    b = begin(bench(side, 0.0, 0.0, Pair.UNKNOWN, beside=(0.01, 0.0), beside_mode=Pair.UNKNOWN, push=1.0, coulomb=50.0))
-    assert (b.mode(side), b.mode(other(side)), b.slide) == (Pair.CONTACT, Pair.CONTACT, Slide.STUCK)
-    assert b.events == [(side, Transition.TOUCH)]
-
-
-def test_a_run_that_starts_forgets_the_slide_of_another() -> None:
-    b = begin(bench(LEFT, -1.0, 0.0, Pair.UNKNOWN, beside_mode=Pair.UNKNOWN, slide=Slide.STUCK))
-    assert b.slide is Slide.FREE
-
-
-@SIDES
-def test_a_pair_at_rest_starts_as_friction_lets_it(side: Body) -> None:
-    """Without friction the object would run away from the arm that pushes it."""
-    options = {"push": 1.0, "object_push": 2.0}
-    free = begin(bench(side, 0.0, 0.0, Pair.UNKNOWN, beside_mode=Pair.UNKNOWN, **options))
-    held = begin(bench(side, 0.0, 0.0, Pair.UNKNOWN, beside_mode=Pair.UNKNOWN, coulomb=5.0, **options))
-    assert (free.mode(side), held.mode(side)) == (Pair.OPEN, Pair.CONTACT)
-    assert (free.events, held.events) == ([], [(side, Transition.TOUCH)])
+@pytest.mark.parametrize(("u", "d", "options", "expected", "slide", "events"), [
+    (0.0, 0.0, {"beside": (0.01, 0.0), "push": 1.0, "coulomb": 50.0}, Pair.CONTACT, Slide.STUCK, [Transition.TOUCH]),
+    (-1.0, 0.0, {"slide": Slide.STUCK}, Pair.OPEN, Slide.FREE, []),  # it forgets the slide of another one
+    (0.0, 0.0, {"push": 1.0, "object_push": 2.0}, Pair.OPEN, Slide.FREE, []),  # the object runs away from the arm
+    (0.0, 0.0, {"push": 1.0, "object_push": 2.0, "coulomb": 5.0}, Pair.CONTACT, Slide.STUCK, [Transition.TOUCH]),
+    (0.01, -2.0, {"object_push": 2.0, "object_speed": 1.0}, Pair.CLAMPED, Slide.FREE, []),  # it leaves the arm behind
+    (0.01, -2.0, {"object_push": 2.0, "object_speed": 1.0, "coulomb": 5.0}, Pair.CONTACT, Slide.RIGHTWARD, []),
+    (0.01, 0.0, {"coulomb": 5.0}, Pair.CONTACT, Slide.RIGHTWARD, []),  # an impact pushes it with 10 N
+])
+def test_a_run_starts_as_its_state_and_its_friction_say(
+    side: Body, u: float, d: float, options: dict[str, Any], expected: Pair, slide: Slide, events: list[Transition]
+) -> None:
+    b = begin(bench(side, u, d, Pair.UNKNOWN, beside_mode=Pair.UNKNOWN, **options))
+    assert (b.mode(side), b.mode(other(side))) == (expected, Pair.CONTACT if "beside" in options else Pair.OPEN)
+    assert b.slide is (toward(side, slide) if slide is Slide.RIGHTWARD else slide)
+    assert b.events == [(side, event) for event in events]
 
 
 @SIDES
-def test_a_pair_on_the_surface_starts_as_friction_lets_it(side: Body) -> None:
-    """u' = -1/p: an object that slides with the pull of 2 N leaves the arm behind, against friction it does not."""
-    options = {"object_push": 2.0, "object_speed": 1.0, "beside_mode": Pair.UNKNOWN}
-    assert begin(bench(side, 0.01, -2.0, Pair.UNKNOWN, **options)).mode(side) is Pair.CLAMPED
-    assert begin(bench(side, 0.01, -2.0, Pair.UNKNOWN, coulomb=5.0, **options)).mode(side) is Pair.CONTACT
-
-
-@SIDES
-def test_an_object_starts_to_slide_if_an_impact_pushes_it(side: Body) -> None:
-    """1e4 (0.01)^(3/2) = 10 N against 5 N."""
-    b = begin(bench(side, 0.01, 0.0, Pair.UNKNOWN, beside_mode=Pair.UNKNOWN, coulomb=5.0))
-    assert (b.slide, b.events) == (toward(side, Slide.RIGHTWARD), [])
-
-
-@SIDES
-@pytest.mark.parametrize("mode", [Pair.OPEN, Pair.RESTING])
-def test_a_resting_pair_touches_when_an_input_begins_to_press(side: Body, mode: Pair) -> None:
-    b = begin(bench(side, 0.0, 0.0, mode, push=1.0))
-    assert b.mode(side) is Pair.CONTACT
-    assert b.events == [(side, Transition.TOUCH)]
-    for push, expected in ((0.0, Pair.RESTING), (-1.0, Pair.OPEN)):
-        b = begin(bench(side, 0.0, 0.0, mode, push=push))
-        assert (b.mode(side), b.events) == (expected, [])
-
-
-@SIDES
-def test_a_pair_that_has_begun_from_rest_is_released_when_an_input_pulls_it(side: Body) -> None:
-    for push, expected in ((-1.0, Pair.OPEN), (0.0, Pair.RESTING)):
-        b = begin(bench(side, 0.0, 0.0, Pair.CONTACT, push=push))
-        assert (b.mode(side), b.events) == (expected, [(side, Transition.RELEASE)])
-    b = begin(bench(side, 0.0, 0.0, Pair.CONTACT, push=1.0))
-    assert (b.mode(side), b.events) == (Pair.CONTACT, [])
-
-
-@SIDES
-@pytest.mark.parametrize(
-    ("u", "d", "mode"), [(0.0, -0.3, Pair.CONTACT), (0.0, 0.3, Pair.CONTACT), (1e-9, 0.0, Pair.CONTACT),
-                         (-1e-9, 0.3, Pair.OPEN), (1e-9, -9.0, Pair.CLAMPED), (1e-9, -0.3, Pair.CONTACT)]
-)
-def test_a_tick_leaves_all_other_pairs_alone(side: Body, u: float, d: float, mode: Pair) -> None:
-    b = begin(bench(side, u, d, mode, push=-1.0))
-    assert (b.mode(side), b.events) == (mode, [])
-
-
-@SIDES
-def test_an_object_that_inputs_hold_at_its_turn_sticks(side: Body) -> None:
-    b = begin(bench(side, -1.0, 0.0, coulomb=5.0, slide=toward(side, Slide.RIGHTWARD), object_push=4.0))
-    assert (b.slide, b.events) == (Slide.STUCK, [(OBJECT, Transition.STICK)])
-
-
-@SIDES
-def test_an_open_pair_in_motion_does_not_wait(side: Body) -> None:
-    """u = 1e-17 is rounding: `mode_of` would call it a contact."""
-    b = bench(side, 1e-17, -0.3, beside=(0.0, 0.0))
-    settle_resting(b.plant, b.state, b.out)
-    assert (b.mode(side), b.events) == (Pair.OPEN, [])
+@pytest.mark.parametrize(("u", "d", "mode", "options", "expected", "event"), [
+    *((0.0, 0.0, mode, {"push": push}, after, event) for mode in (Pair.OPEN, Pair.RESTING) for push, after, event in (
+        (1.0, Pair.CONTACT, Transition.TOUCH), (0.0, Pair.RESTING, None), (-1.0, Pair.OPEN, None))),
+    (0.0, 0.0, Pair.CONTACT, {"push": -1.0}, Pair.OPEN, Transition.RELEASE),
+    (0.0, 0.0, Pair.CONTACT, {}, Pair.RESTING, Transition.RELEASE),
+    (0.0, 0.0, Pair.CONTACT, {"push": 1.0}, Pair.CONTACT, None),
+    *((u, d, mode, {"push": -1.0}, mode, None) for u, d, mode in (  # in motion
+        (0.0, -0.3, Pair.CONTACT), (0.0, 0.3, Pair.CONTACT), (1e-9, 0.0, Pair.CONTACT), (-1e-9, 0.3, Pair.OPEN),
+        (1e-9, -9.0, Pair.CLAMPED), (1e-9, -0.3, Pair.CONTACT))),
+    (0.01, -2.0 - 1e-14, Pair.LEAVING, {}, Pair.LEAVING, None),
+    (0.01, -2.0 + 1e-14, Pair.LEAVING, {}, Pair.LEAVING, None),
+    (0.01, -2.0 - 1e-9, Pair.LEAVING, {}, Pair.CLAMPED, Transition.CLAMP),
+    (0.01, -2.0 + 1e-9, Pair.LEAVING, {}, Pair.CONTACT, None),
+    (0.01, -2.0, Pair.LEAVING, {"push": 1.0}, Pair.CONTACT, None),
+    (0.01, -2.0, Pair.LEAVING, {"push": -1.0}, Pair.CLAMPED, Transition.CLAMP),
+])
+def test_what_a_tick_makes_of_a_pair(side: Body, u: float, d: float, mode: Pair, options: dict[str, float],
+                                     expected: Pair, event: Transition | None) -> None:
+    b = begin(bench(side, u, d, mode, **options))  # type: ignore[arg-type]
+    assert b.mode(side) is expected
+    assert b.events == ([] if event is None else [(side, event)])
 
 
 @SIDES
@@ -528,17 +449,6 @@ def test_pairs_that_leave_are_in_contact_again_when_inputs_may_change(side: Body
 
 
 @SIDES
-@pytest.mark.parametrize(("d", "options", "expected"), [
-    (-2.0 - 1e-14, {}, Pair.LEAVING), (-2.0 + 1e-14, {}, Pair.LEAVING), (-2.0 - 1e-9, {}, Pair.CLAMPED),
-    (-2.0 + 1e-9, {}, Pair.CONTACT), (-2.0, {"push": 1.0}, Pair.CONTACT), (-2.0, {"push": -1.0}, Pair.CLAMPED)])
-def test_a_pair_that_glides_goes_on_where_inputs_do_not_move_it(side: Body, d: float, options: dict[str, float],
-                                                                expected: Pair) -> None:
-    b = begin(bench(side, 0.01, d, Pair.LEAVING, **options))  # type: ignore[arg-type]
-    assert b.mode(side) is expected
-    assert b.events == ([(side, Transition.CLAMP)] if expected is Pair.CLAMPED else [])
-
-
-@SIDES
 def test_a_pair_that_is_pushed_back_pushes_back_the_other_one(side: Body) -> None:
     """Both glide, and an input presses only one arm; the object that it pushes comes towards the other one."""
     glides = (0.01, -2.0)
@@ -547,17 +457,20 @@ def test_a_pair_that_is_pushed_back_pushes_back_the_other_one(side: Body) -> Non
 
 
 @SIDES
-def test_a_stuck_object_slips_when_an_input_exceeds_its_friction(side: Body) -> None:
-    b = begin(bench(side, -1.0, 0.0, coulomb=5.0, slide=Slide.STUCK, object_push=6.0))
-    assert b.slide is toward(side, Slide.RIGHTWARD)
-    assert b.events == [(OBJECT, Transition.SLIP)]
-    held = begin(bench(side, -1.0, 0.0, coulomb=5.0, slide=Slide.STUCK, object_push=4.0))
-    assert (held.slide, held.events) == (Slide.STUCK, [])
-    moving = begin(bench(side, -1.0, 0.0, coulomb=5.0, slide=Slide.STUCK, object_speed=1.0))
-    moved = toward(side, Slide.RIGHTWARD)
-    assert (moving.slide, moving.events) == (moved, [(OBJECT, Transition.SLIP)])
-    again = begin(bench(side, -1.0, 0.0, coulomb=5.0, slide=moved, object_speed=1.0))
-    assert (again.slide, again.events) == (moved, [])
+@pytest.mark.parametrize(("before", "options", "after", "event"), [
+    (Slide.STUCK, {"object_push": 6.0}, Slide.RIGHTWARD, Transition.SLIP),
+    (Slide.STUCK, {"object_push": 4.0}, Slide.STUCK, None),
+    (Slide.STUCK, {"object_speed": 1.0}, Slide.RIGHTWARD, Transition.SLIP),
+    (Slide.RIGHTWARD, {"object_speed": 1.0}, Slide.RIGHTWARD, None),
+    (Slide.RIGHTWARD, {"object_push": 4.0}, Slide.STUCK, Transition.STICK),  # held at its turn
+])
+def test_what_a_tick_makes_of_an_object(side: Body, before: Slide, options: dict[str, float], after: Slide,
+                                        event: Transition | None) -> None:
+    """5 N of friction."""
+    before, after = (own if own is Slide.STUCK else toward(side, own) for own in (before, after))
+    b = begin(bench(side, -1.0, 0.0, coulomb=5.0, slide=before, **options))  # type: ignore[arg-type]
+    assert b.slide is after
+    assert b.events == ([] if event is None else [(OBJECT, event)])
 
 
 @SIDES
@@ -574,18 +487,26 @@ def test_an_interval_that_goes_on_keeps_its_modes(side: Body) -> None:
 
 
 @SIDES
-@pytest.mark.parametrize(
-    ("u", "d", "mode", "touches"),
-    [
-        (0.0, 0.0, Pair.OPEN, True), (0.0, 0.0, Pair.RESTING, True),
-        (-1e-9, 0.0, Pair.OPEN, False), (0.0, -1e-9, Pair.OPEN, False),
-        (0.0, 0.0, Pair.ABSENT, False), (0.0, 0.0, Pair.LEAVING, False), (0.0, 0.0, Pair.CONTACT, False),
-    ],
-)
-def test_only_a_pair_at_rest_without_force_settles(side: Body, u: float, d: float, mode: Pair, touches: bool) -> None:
-    b = bench(side, u, d, mode, push=1.0)
+@pytest.mark.parametrize(("u", "d", "mode", "options", "expected"), [
+    (0.0, 0.0, Pair.OPEN, {"push": 1.0}, Pair.CONTACT),
+    (0.0, 0.0, Pair.RESTING, {"push": 1.0}, Pair.CONTACT),
+    *((u, d, mode, {"push": 1.0}, mode) for u, d, mode in (
+        (-1e-9, 0.0, Pair.OPEN), (0.0, -1e-9, Pair.OPEN), (0.0, 0.0, Pair.ABSENT), (0.0, 0.0, Pair.LEAVING),
+        (0.0, 0.0, Pair.CONTACT))),
+    (1e-17, -0.3, Pair.OPEN, {"beside": (0.0, 0.0)}, Pair.OPEN),  # u is rounding: `mode_of` would call it a contact
+    *((0.0, 0.0, mode, {"beside_mode": beside_mode, "beside": beside}, expected)
+      for mode in (Pair.OPEN, Pair.RESTING) for beside_mode, beside, expected in (
+        (Pair.CONTACT, (0.01, 0.1), Pair.CONTACT), (Pair.CONTACT, (0.0, 0.1), Pair.CONTACT),
+        (Pair.CLAMPED, (0.01, -9.0), Pair.RESTING), (Pair.OPEN, (-0.1, 0.1), Pair.RESTING))),
+])
+def test_only_a_pair_at_rest_without_force_settles(
+    side: Body, u: float, d: float, mode: Pair, options: dict[str, Any], expected: Pair
+) -> None:
+    """By its input, or by what the other one begins to push."""
+    b = bench(side, u, d, mode, **options)
     settle_resting(b.plant, b.state, b.out)
-    assert b.mode(side) is (Pair.CONTACT if touches else mode)
+    touches = expected is Pair.CONTACT is not mode
+    assert b.mode(side) is expected
     assert b.events == ([(side, Transition.TOUCH)] if touches else [])
     assert b.recorded_motion == ([(0.0, 0.0)] if touches else [])
 
@@ -599,19 +520,6 @@ def test_a_pair_at_rest_is_one_at_zero_without_speed(side: Body, u: float, d: fl
 def test_a_closed_pair_is_between_its_touch_and_its_release() -> None:
     closed = {Pair.CONTACT, Pair.BEGINNING, Pair.CLAMPED, Pair.LEAVING}
     assert {mode for mode in Pair if is_closed(mode)} == closed
-
-
-@SIDES
-@pytest.mark.parametrize("mode", [Pair.OPEN, Pair.RESTING])
-def test_a_resting_pair_touches_when_the_other_one_begins_to_push(side: Body, mode: Pair) -> None:
-    for beside_mode, beside, expected in (
-        (Pair.CONTACT, (0.01, 0.1), Pair.CONTACT), (Pair.CONTACT, (0.0, 0.1), Pair.CONTACT),
-        (Pair.CLAMPED, (0.01, -9.0), Pair.RESTING), (Pair.OPEN, (-0.1, 0.1), Pair.RESTING),
-    ):
-        b = bench(side, 0.0, 0.0, mode, beside=beside, beside_mode=beside_mode)
-        settle_resting(b.plant, b.state, b.out)
-        assert b.mode(side) is expected
-        assert b.events == ([(side, Transition.TOUCH)] if expected is Pair.CONTACT else [])
 
 
 @SIDES
@@ -631,61 +539,35 @@ def depth(d: float) -> float:
 STAY, LEAVING = ((mode, mode) for mode in (Pair.CONTACT, Pair.LEAVING))
 
 
-def together(side: Body, u: float, d: float, beside: tuple[float, float], **options: Any) -> tuple[Pair, Pair]:
-    """Both pairs in contact, u in units of `depth`: their modes behind `let_leave`."""
+U_SOON = 0.5 * depth(1e-4)  # m
+
+
+@SIDES
+@pytest.mark.parametrize(("u", "d", "beside", "options", "expected"), [
+    (0.1, -0.3, (0.1, -0.3), {}, LEAVING), (0.9, -0.3, (0.1, -0.3), {}, LEAVING),
+    (0.9, -0.3, (0.9, -1.3), {}, LEAVING), (0.0, -0.3, (0.1, -0.3), {}, LEAVING),
+    (1.1, -0.3, (0.1, -0.3), {}, STAY),
+    (0.1, -0.3, (0.1, 0.3), {}, STAY),  # one goes, one comes
+    (0.0, 0.3, (0.0, 0.3), {}, STAY),  # both touch at once
+    (0.0, 0.0, (0.1, -0.3), {}, STAY), (0.0, 0.0, (0.0, 0.0), {}, STAY),
+    # an object at rest that slips needs the force that lets it: without it friction would push it
+    *((0.1, -0.3, (0.1, -0.3), {"slide": slide, "coulomb": 1e-9, "object_speed": speed}, expected)
+      for slide in (Slide.RIGHTWARD, Slide.LEFTWARD) for speed, expected in ((0.0, STAY), (0.5, LEAVING))),
+    # 20 u |u''| beside u'^2: a push that turns it before u = 0 keeps it in contact
+    *((0.5, -1e-4, (0.5, -1e-4), {"push": push}, expected)
+      for push, expected in ((0.0, LEAVING), (1e9, STAY), (-1e9, STAY))),
+    *((0.5, -1e-4, (0.5, -1e-4), {"stiffness": part * (1e-4 / U_SOON) ** 2, "push": part * 1e-8 / U_SOON}, expected)
+      for part, expected in ((1e2, STAY), (1e-2, LEAVING))),  # a spring that a push balances
+])
+def test_both_pairs_leave_together(
+    side: Body, u: float, d: float, beside: tuple[float, float], options: dict[str, Any], expected: tuple[Pair, Pair]
+) -> None:
+    """u in units of `depth`."""
     far = (beside[0] * depth(abs(beside[1])), beside[1])
     b = bench(side, u * depth(abs(d)), d, Pair.CONTACT, beside=far, beside_mode=Pair.CONTACT, **options)
     let_leave(b.plant, b.state, b.settings)
+    assert (b.mode(side), b.mode(other(side))) == expected
     assert b.events == []
-    return b.mode(side), b.mode(other(side))
-
-
-@SIDES
-@pytest.mark.parametrize(
-    ("u", "d", "beside", "expected"),
-    [
-        (0.1, -0.3, (0.1, -0.3), LEAVING),
-        (0.9, -0.3, (0.1, -0.3), LEAVING),
-        (0.9, -0.3, (0.9, -1.3), LEAVING),
-        (0.0, -0.3, (0.1, -0.3), LEAVING),
-        (1.1, -0.3, (0.1, -0.3), STAY),
-        (0.1, -0.3, (0.1, 0.3), STAY),  # one goes, one comes
-        (0.0, 0.3, (0.0, 0.3), STAY),  # both touch at once
-        (0.0, 0.0, (0.1, -0.3), STAY),
-        (0.0, 0.0, (0.0, 0.0), STAY),
-    ],
-)
-def test_both_pairs_leave_together(
-    side: Body, u: float, d: float, beside: tuple[float, float], expected: tuple[Pair, Pair]
-) -> None:
-    assert together(side, u, d, beside) == expected
-
-
-@SIDES
-@pytest.mark.parametrize("slide", [Slide.RIGHTWARD, Slide.LEFTWARD])
-def test_an_object_at_rest_that_slips_needs_the_force_that_lets_it(side: Body, slide: Slide) -> None:
-    """Without it friction would push the object instead of braking it."""
-    assert together(side, 0.1, -0.3, (0.1, -0.3), slide=slide, coulomb=1e-9) == STAY
-    assert together(side, 0.1, -0.3, (0.1, -0.3), slide=slide, coulomb=1e-9, object_speed=0.5) == LEAVING
-
-
-@SIDES
-def test_a_pair_that_glides_leaves_alone(side: Body) -> None:
-    b = bench(side, 0.01, -2.0, Pair.CONTACT)
-    let_leave(b.plant, b.state, b.settings)
-    assert (b.mode(side), b.mode(other(side)), b.events) == (Pair.LEAVING, Pair.OPEN, [])
-
-
-@SIDES
-def test_a_pair_that_will_turn_back_does_not_leave(side: Body) -> None:
-    """20 u |u''| beside u'^2: a push that turns it before u = 0 keeps it in contact."""
-    assert together(side, 0.5, -1e-4, (0.5, -1e-4)) == LEAVING
-    assert together(side, 0.5, -1e-4, (0.5, -1e-4), push=1e9) == STAY
-    assert together(side, 0.5, -1e-4, (0.5, -1e-4), push=-1e9) == STAY
-    u = 0.5 * depth(1e-4)
-    for part, expected in ((1e2, STAY), (1e-2, LEAVING)):  # a spring that a push balances
-        k = part * (1e-4 / u) ** 2
-        assert together(side, 0.5, -1e-4, (0.5, -1e-4), stiffness=k, push=k * u) == expected
 
 
 @SIDES
@@ -697,10 +579,17 @@ def test_one_pair_alone_does_not_leave_without_its_force(side: Body, beside_mode
 
 
 @SIDES
-def test_only_a_pair_in_contact_leaves(side: Body) -> None:
-    b = bench(side, 0.01, -2.0, Pair.CLAMPED)
+@pytest.mark.parametrize(("d", "mode", "options", "expected"), [
+    (-2.0, Pair.CONTACT, {}, Pair.LEAVING), (-1.0, Pair.CONTACT, {}, Pair.CONTACT),
+    (-2.0, Pair.CONTACT, {"push": 1.0}, Pair.CONTACT),
+    *((-2.0, mode, {}, mode) for mode in Pair if mode is not Pair.CONTACT),
+])
+def test_only_a_pair_in_contact_that_nothing_moves_leaves_alone(
+    side: Body, d: float, mode: Pair, options: dict[str, Any], expected: Pair
+) -> None:
+    b = bench(side, 0.01, d, mode, **options)
     let_leave(b.plant, b.state, b.settings)
-    assert b.mode(side) is Pair.CLAMPED
+    assert (b.mode(side), b.mode(other(side)), b.events) == (expected, Pair.OPEN, [])
 
 
 # Pairs that begin without their force.

@@ -110,7 +110,6 @@ def test_a_file_that_cannot_be_rebuilt_is_compiled_anew(cached: Path) -> None:
 def test_kernels_that_cannot_be_kept_where_they_belong_are_kept_among_temporary_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Each command compiled anew, said that it was for once, and left a directory."""
     (tmp_path / "file").touch()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file"))
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
@@ -155,17 +154,14 @@ def test_processes_that_write_at_once_leave_whole_files(tmp_path: Path) -> None:
         kernel_cache.read_checked(path)
 
 
-@pytest.mark.parametrize(
-    ("owner", "name"),
-    [
-        (JITCodeLibrary, "_finalize_final_module"), (JITCodeLibrary, "_optimize_final_module"),
-        (CPUDispatcher, "compile"), (BaseFunction, "get_call_type"), (NullCache, "load_overload"),
-        (NullCache, "save_overload"), (CompileResult, "_rebuild"), (CompileResult, "_reduce"),
-        (cpu_target.target_context.codegen(), "_library_class"), (cpu_target.target_context.codegen(), "magic_tuple"),
-        (cpu_target.target_context.codegen(), "set_env"),
-        (numba.njit(twice), "_cache"), (numba.njit(twice), "targetctx"), (numba.njit(twice), "targetoptions"),
-    ],
-)
+@pytest.mark.parametrize(("owner", "name"), [
+    (JITCodeLibrary, "_finalize_final_module"), (JITCodeLibrary, "_optimize_final_module"),
+    (CPUDispatcher, "compile"), (BaseFunction, "get_call_type"), (NullCache, "load_overload"),
+    (NullCache, "save_overload"), (CompileResult, "_rebuild"), (CompileResult, "_reduce"),
+    (cpu_target.target_context.codegen(), "_library_class"), (cpu_target.target_context.codegen(), "magic_tuple"),
+    (cpu_target.target_context.codegen(), "set_env"),
+    (numba.njit(twice), "_cache"), (numba.njit(twice), "targetctx"), (numba.njit(twice), "targetoptions"),
+])
 def test_numba_has_what_is_used_of_its_inside(owner: Any, name: str) -> None:
     assert hasattr(owner, name), (
         f"numba {numba.__version__} has moved it; used by grasp_ros/exact/compilation/numba_internals.py"

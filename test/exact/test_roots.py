@@ -13,37 +13,38 @@ from grasp_ros.exact.numerics.roots import first_rise, safe_step, shift
 from grasp_ros.physics.layout import Work
 
 
+def searched(coefficients: Any, h: float, noise: float = 0.0) -> tuple[float, int]:
+    """The kernel's answer for coefficients in ascending order, and the iterations that it took."""
+    work, f = np.zeros(len(Work), dtype=np.int64), np.array(coefficients, dtype=float)
+    return first_rise(f, len(f) - 1, h, noise, work), int(work[Work.ROOT_ITERATIONS])
+
+
 def rise(coefficients: Any, h: float) -> float:
-    """The kernel's answer for coefficients in ascending order."""
-    work = np.zeros(len(Work), dtype=np.int64)
-    f = np.array(coefficients, dtype=float)
-    result = first_rise(f, len(f) - 1, h, 0.0, work)
-    assert work[Work.ROOT_ITERATIONS] < 5000
-    return result
+    """The answer alone."""
+    found, iterations = searched(coefficients, h)
+    assert iterations < 5000
+    return found
 
 
-@pytest.mark.parametrize(
-    ("coefficients", "h", "expected"),
-    [
-        ([-1.0, 2.0], 1.0, 0.5),
-        ([-1.0, 2.0], 0.4, math.inf),
-        ([-1.0, 1.0], 1.0, 1.0),  # (0, h]
-        ([-1.0, 0.0, 0.0, 0.0, 0.0, 32.0], 1.0, 0.5),
-        ([0.0, -1.0, 1.0], 2.0, 1.0),  # zero at the start, falling
-        ([0.0, -1.0, 1.0], 0.9, math.inf),
-        ([0.0, 0.0, -1.0, 1.0], 2.0, 1.0),  # double zeros at the start are divided out
-        ([0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 4.0], 2.0, 0.5),
-        ([0.0, 0.0, 0.0, -1.0, 2.0], 2.0, 0.5),
-        ([0.0, 0.0, -1.0], 2.0, math.inf),
-        ([0.0, -1.0], 2.0, math.inf),
-        ([0.0, 0.0, 0.0], 2.0, math.inf),
-        ([-0.3, 1.1, -1.0], 1.0, 0.5),  # -(s - 0.5)(s - 0.6): rises at 0.5, falls at 0.6
-        ([-0.24, 1.0, -1.0], 1.0, 0.4),
-        ([-0.26, 1.0, -1.0], 1.0, math.inf),
-        ([-0.25 - 1e-9, 1.0, -1.0], 1.0, math.inf),  # a double root, missed by 1e-9
-        ([-1.0, 0.0, 0.0], 1e300, math.inf),
-    ],
-)
+@pytest.mark.parametrize(("coefficients", "h", "expected"), [
+    ([-1.0, 2.0], 1.0, 0.5),
+    ([-1.0, 2.0], 0.4, math.inf),
+    ([-1.0, 1.0], 1.0, 1.0),  # (0, h]
+    ([-1.0, 0.0, 0.0, 0.0, 0.0, 32.0], 1.0, 0.5),
+    ([0.0, -1.0, 1.0], 2.0, 1.0),  # zero at the start, falling
+    ([0.0, -1.0, 1.0], 0.9, math.inf),
+    ([0.0, 0.0, -1.0, 1.0], 2.0, 1.0),  # double zeros at the start are divided out
+    ([0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 4.0], 2.0, 0.5),
+    ([0.0, 0.0, 0.0, -1.0, 2.0], 2.0, 0.5),
+    ([0.0, 0.0, -1.0], 2.0, math.inf),
+    ([0.0, -1.0], 2.0, math.inf),
+    ([0.0, 0.0, 0.0], 2.0, math.inf),
+    ([-0.3, 1.1, -1.0], 1.0, 0.5),  # -(s - 0.5)(s - 0.6): rises at 0.5, falls at 0.6
+    ([-0.24, 1.0, -1.0], 1.0, 0.4),
+    ([-0.26, 1.0, -1.0], 1.0, math.inf),
+    ([-0.25 - 1e-9, 1.0, -1.0], 1.0, math.inf),  # a double root, missed by 1e-9
+    ([-1.0, 0.0, 0.0], 1e300, math.inf),
+])
 def test_first_rise_of_known_polynomials(coefficients: Any, h: float, expected: float) -> None:
     assert rise(coefficients, h) == pytest.approx(expected, rel=1e-13)
 
@@ -56,10 +57,9 @@ def test_first_rise_beside_a_double_root(eps: float) -> None:
 
 @pytest.mark.parametrize("gap", [1e-100, 1e-200, 1e-290])
 def test_a_root_next_to_zero_keeps_its_digits_and_costs_nothing(gap: float) -> None:
-    work = np.zeros(len(Work), dtype=np.int64)
-    found = first_rise(np.array([-gap, 2.0, -0.5]), 2, 1.0, 0.0, work)
+    found, iterations = searched([-gap, 2.0, -0.5], 1.0)
     assert found == pytest.approx(0.5 * gap, rel=1e-15, abs=0.0)
-    assert work[Work.ROOT_ITERATIONS] < 10
+    assert iterations < 10
 
 
 @pytest.mark.parametrize("zeros", range(1, 6))
@@ -83,10 +83,9 @@ def test_noise_at_the_end_of_a_step_hides_no_root_at_its_begin() -> None:
 
 
 def test_within_its_noise_a_polynomial_counts_as_zero() -> None:
-    work = np.zeros(len(Work), dtype=np.int64)
-    falls_short = np.array([-1.0, 2.0, -1.0 - 1e-9])  # its top is 1e-9 below zero
-    assert first_rise(falls_short.copy(), 2, 2.0, 0.0, work) == math.inf
-    assert first_rise(falls_short.copy(), 2, 2.0, 1e-8, work) == pytest.approx(1.0, rel=1e-3)
+    falls_short = [-1.0, 2.0, -1.0 - 1e-9]  # its top is 1e-9 below zero
+    assert rise(falls_short, 2.0) == math.inf
+    assert searched(falls_short, 2.0, 1e-8)[0] == pytest.approx(1.0, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -94,8 +93,7 @@ def test_within_its_noise_a_polynomial_counts_as_zero() -> None:
 )
 def test_what_has_risen_above_its_noise_before_is_not_lost(value: float, rate: float, found: bool) -> None:
     """Steps that end earlier than it can be told from noise must not carry it on for ever."""
-    work = np.zeros(len(Work), dtype=np.int64)
-    s = first_rise(np.array([value, rate, 0.0]), 2, 1e-10, 1e-8, work)
+    s, _ = searched([value, rate, 0.0], 1e-10, 1e-8)
     assert (0.0 < s < 1e-40) if found else s == math.inf
 
 
@@ -112,12 +110,12 @@ def test_a_shifted_polynomial_is_the_same_function(s: float) -> None:
 @pytest.mark.parametrize("order", [12, 20, 28])
 def test_terms_that_cancel_cost_few_steps(order: int) -> None:
     """1/2 - (1 - s)^n rises through zero, -1/1000 - (1 - s)^n does not; their terms are 2^n times as large."""
-    work = np.zeros(len(Work), dtype=np.int64)
     f = np.array([-float(mp.binomial(order, k)) * (-1.0) ** k for k in range(order + 1)])
     one = np.eye(order + 1)[0]
-    assert first_rise(f + 0.5 * one, order, 0.9, 0.0, work) == pytest.approx(1.0 - 0.5 ** (1.0 / order), rel=1e-12)
-    assert first_rise(f - 1e-3 * one, order, 0.9, 0.0, work) == math.inf
-    assert work[Work.ROOT_ITERATIONS] < 2000
+    (found, steps), (none, more) = (searched(f + offset * one, 0.9) for offset in (0.5, -1e-3))
+    assert found == pytest.approx(1.0 - 0.5 ** (1.0 / order), rel=1e-12)
+    assert none == math.inf
+    assert steps + more < 2000
 
 
 @pytest.mark.parametrize("seed", range(30))

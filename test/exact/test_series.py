@@ -71,13 +71,6 @@ def at(table: Array, s: float) -> Array:
     return out[:LANES]
 
 
-def tables_of(table: Array, value: Array | None = None, size: Array | None = None) -> Tables:
-    """A workspace with a finished table, and what was computed from it."""
-    empty = np.zeros(2 * LANES)
-    value, size = (empty if given is None else given for given in (value, size))
-    return Tables(table.ravel(), empty, value, size, empty)
-
-
 def sides(name: str) -> tuple[bool, bool]:
     """Which pairs are in contact."""
     return name.startswith(("left", "both")), name.startswith(("right", "both"))
@@ -300,7 +293,7 @@ def test_time_is_inverted_to_rounding(name: str) -> None:
     c, high = expand(name, n, unit=unit), 0.3 if "both" in name else 0.2
     for s in (1e-9, 0.03, 0.17, high):
         tau, total = at(c, s)[Lane.TIME], at(c, high)[Lane.TIME]
-        tables = tables_of(c)
+        tables = Tables(c.ravel(), *[np.zeros(2 * LANES)] * 4)
         found = invert_time(tables.c, tables.at, step_of(name, n, unit), tau, high, total)
         assert at(c, found)[Lane.TIME] == pytest.approx(tau, rel=1e-15, abs=1e-17)
 

@@ -188,7 +188,6 @@ def test_times_may_be_a_rounding_off_the_ticks_and_a_body_without_a_force_needs_
 
 
 def test_an_initial_value_that_was_measured_starts_there() -> None:
-    """From -0.2 the search ended at -0.03, with a narrow interval."""
     scene, key = load("case_01", ["time.duration_s=2"]), "right_arm.position_m"
     found = fit(noisy(simulate(scene), 7), [key], scene.changed({key: -0.2}))
     assert found.low[0] < 0.5 < found.high[0]
@@ -289,49 +288,48 @@ def test_a_scene_with_a_loop_holds_its_commands_whatever_the_data_came_from() ->
 ROWS = "t_s,x_left_m,x_object_m\n" + "".join(f"{0.01 * row},{-0.3 + 0.001 * row},0\n" for row in range(20))
 HELD = "".join(f"{line},{'input_left_N,input_object_N,input_right_N' if line[0] == 't' else '0,0,0'}\n"
                for line in ROWS.splitlines())  # inputs, but not at every tick
+CASE = ("--scene", "case_01", "--free", P_LEFT)
 
 
 @pytest.mark.parametrize(("content", "words", "complaint"), [
     (ROWS, ("--free", P_LEFT), "a table does not name its scene; allowed: with a scene (--scene, or scene=)"),
     (ROWS, ("--scene", "case_01", "--free", "left_contact.hertz"), f"did you mean {H_LEFT}"),
     (ROWS, ("--scene", "case_01", "--free", "time.duration_s"), "has no derivative: it moves ticks"),
-    (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--free", P_LEFT), "given twice"),
+    (ROWS, (*CASE, "--free", P_LEFT), "given twice"),
     (ROWS, ("--scene", "case_01", "--free", "offset.x_left_m"), "at least one parameter of the scene"),
-    (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--free", "offset.v_left_m_per_s"), "not measured"),
+    (ROWS, (*CASE, "--free", "offset.v_left_m_per_s"), "not measured"),
     (ROWS, ("--scene", "case_02", "--free", P_LEFT), f"allowed: a start > 0, as by the setting {P_LEFT}=VALUE"),
-    (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", f"{H_LEFT}=1"),
-     "allowed: a free parameter of the scene"),
-    (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", f"{P_LEFT}=1", "--against", f"{P_LEFT}=0"),
+    (ROWS, (*CASE, "--against", f"{H_LEFT}=1"), "allowed: a free parameter of the scene"),
+    (ROWS, (*CASE, "--against", f"{P_LEFT}=1", "--against", f"{P_LEFT}=0"),
      f"--against {P_LEFT}: given twice; allowed: one value"),
-    (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", P_LEFT), "allowed: KEY=VALUE, with a number"),
-    (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", f"{P_LEFT}=-1"), "dissipation_s_per_m: -1.0 is not"),
-    (ROWS.replace("t_s", "t"), ("--scene", "case_01", "--free", P_LEFT), "allowed: t_s and at least one of x_left_m"),
-    (ROWS.replace("x_object_m", "x_left_m"), ("--scene", "case_01", "--free", P_LEFT), "allowed: each name once"),
-    (ROWS.replace("-0.298,", "nan,"), ("--scene", "case_01", "--free", P_LEFT), "x_left_m: nan at t = 0.02 s; all"),
-    (ROWS.replace("-0.298,", "north,"), ("--scene", "case_01", "--free", P_LEFT), "line 4: could not convert"),
-    (ROWS.replace("-0.298,", ""), ("--scene", "case_01", "--free", P_LEFT), "line 4: 2 entries; allowed: 3"),
-    (ROWS.replace("0.02,", "0.2,"), ("--scene", "case_01", "--free", P_LEFT),
+    (ROWS, (*CASE, "--against", P_LEFT), "allowed: KEY=VALUE, with a number"),
+    (ROWS, (*CASE, "--against", f"{P_LEFT}=-1"), "dissipation_s_per_m: -1.0 is not"),
+    (ROWS.replace("t_s", "t"), CASE, "allowed: t_s and at least one of x_left_m"),
+    (ROWS.replace("x_object_m", "x_left_m"), CASE, "allowed: each name once"),
+    (ROWS.replace("-0.298,", "nan,"), CASE, "x_left_m: nan at t = 0.02 s; all"),
+    (ROWS.replace("-0.298,", "north,"), CASE, "line 4: could not convert"),
+    (ROWS.replace("-0.298,", ""), CASE, "line 4: 2 entries; allowed: 3"),
+    (ROWS.replace("0.02,", "0.2,"), CASE,
      "t_s: 0.03 after 0.2 is not allowed; allowed: ascending from 0 to 20.0 s, each once"),
-    ("\n".join(ROWS.splitlines()[:10]), ("--scene", "case_01", "--free", P_LEFT), "samples; allowed: at least 10"),
-    ("", ("--scene", "case_01", "--free", P_LEFT), "allowed: t_s and at least one of x_left_m"),
-    (ROWS.replace("x_object_m", "x_objekt_m"), ("--scene", "case_01", "--free", P_LEFT),
-     "column 'x_objekt_m': not known; did you mean x_object_m?"),
-    (ROWS.replace("-0.298,", "1_0.0,"), ("--scene", "case_01", "--free", P_LEFT), "line 4: could not convert"),
-    (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", f"{P_LEFT}=1_0"), "allowed: KEY=VALUE, with a number"),
+    ("\n".join(ROWS.splitlines()[:10]), CASE, "samples; allowed: at least 10"),
+    ("", CASE, "allowed: t_s and at least one of x_left_m"),
+    (ROWS.replace("x_object_m", "x_objekt_m"), CASE, "column 'x_objekt_m': not known; did you mean x_object_m?"),
+    (ROWS.replace("-0.298,", "1_0.0,"), CASE, "line 4: could not convert"),
+    (ROWS, (*CASE, "--against", f"{P_LEFT}=1_0"), "allowed: KEY=VALUE, with a number"),
     (ROWS, ("--scene", "friction", "--free", "object_friction.coulomb_N", "--against", "object_friction.coulomb_N=0"),
      "object_friction.coulomb_N has no derivative at 0"),
-    (re.sub(r"-0\.\d+", "0", ROWS), ("--scene", "case_01", "--free", P_LEFT), "positions do not change; allowed: a"),
+    (re.sub(r"-0\.\d+", "0", ROWS), CASE, "positions do not change; allowed: a"),
     (ROWS, ("--scene", "arm_alone", "--free", "left_arm.mass_kg"), "x_object_m: arm_alone has no such body"),
-    (HELD, ("--scene", "case_01", "--set", "loop={}", "--free", P_LEFT), "not the ticks of case_01, every 0.001 s"),
-    (HELD.replace("input_right_N", "impact_right_N"), ("--scene", "case_01", "--set", "loop={}", "--free", P_LEFT),
+    (HELD, (*CASE, "--set", "loop={}"), "not the ticks of case_01, every 0.001 s"),
+    (HELD.replace("input_right_N", "impact_right_N"), (*CASE, "--set", "loop={}"),
      "no column input_right_N, the force that acted; allowed: one for each body that is driven, or neither forces nor"),
     (HELD.replace("input", "command").replace("command_object_N", "V_J"),
-     ("--scene", "case_01", "--set", "loop={}", "--free", P_LEFT), "no column input_left_N, input_right_N, the force"),
-    (ROWS.replace("-0.298,", "-2e200,"), ("--scene", "case_01", "--free", P_LEFT), "x_left_m: -2e+200 at t = 0.02 s"),
-    (ROWS.replace(",", ";"), ("--scene", "case_01", "--free", P_LEFT), "one of x_left_m, v_left_m_per_s"),
-    ("# mine\n" + ROWS, ("--scene", "case_01", "--free", P_LEFT), "line 1: # mine; allowed: t_s and at least one of"),
+     (*CASE, "--set", "loop={}"), "no column input_left_N, input_right_N, the force"),
+    (ROWS.replace("-0.298,", "-2e200,"), CASE, "x_left_m: -2e+200 at t = 0.02 s"),
+    (ROWS.replace(",", ";"), CASE, "one of x_left_m, v_left_m_per_s"),
+    ("# mine\n" + ROWS, CASE, "line 1: # mine; allowed: t_s and at least one of"),
     (re.sub("0$", "0,ok", ROWS.replace("object_m", "object_m,why"), flags=re.MULTILINE),
-     ("--scene", "case_01", "--free", P_LEFT), "column 'why': not known"),
+     CASE, "column 'why': not known"),
 ], ids=range(32))
 def test_refusals(tmp_path: Path, command: Any, content: str, words: tuple[str, ...], complaint: str) -> None:
     (tmp_path / "data.csv").write_text(content)
@@ -353,7 +351,7 @@ def test_the_law_of_another_controller_has_no_numbers() -> None:
 
 
 def test_a_bag_without_commands_does_not_say_which_law_acted(held: Trajectory, tmp_path: Path) -> None:
-    """The law of the scene was taken for granted: gains that somebody had set came out between the two values."""
+    """Somebody may have set other gains than those of the scene."""
     recorder.write(tmp_path / "bag", held)
     rewritten(tmp_path / "bag" / "bag.mcap", tmp_path / "new.mcap", without={"/left/effort_command": 0})
     assert fit(tmp_path / "new.mcap", [P_LEFT]).estimates == pytest.approx([0.1], rel=1e-9)
@@ -362,13 +360,12 @@ def test_a_bag_without_commands_does_not_say_which_law_acted(held: Trajectory, t
 
 
 def test_recorded_inputs_keep_their_times(held: Trajectory) -> None:
-    """Those of every 2 ms were held for 1 ms each, and the stiffness was wrong by a factor of three."""
     with pytest.raises(Refused, match=r"its inputs change every 0\.002 s; allowed: a scene with that time\.control"):
         fit(held, [P_LEFT], SCENE.changed({"time.control_period_s": 0.001}))
 
 
 def test_a_start_whose_motions_take_for_ever_is_refused(held: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An object of 1 ug between arms of 1 kg bounces in each contact; a fit was silent for hours."""
+    """An object of 1 ug between arms of 1 kg bounces in each contact."""
     monkeypatch.setattr("grasp_ros.identification.search.WORK", 1000)
     with pytest.raises(Refused, match=r"run: object.mass_kg 1e-09: with these starts no run .* reaches its end"):
         fit(held, ["object.mass_kg"], SCENE.changed({"object.mass_kg": 1e-9}))

@@ -130,7 +130,7 @@ def test_a_search_of_scipy_that_fails_is_a_status() -> None:
 
 @pytest.mark.parametrize("name", STEPPING)
 def test_the_first_state_is_the_initial_one(name: str) -> None:
-    """LSODA interpolates it, and so rounded one in some of these."""
+    """LSODA interpolates it."""
     for speed in np.linspace(0.1, 1.0, 20).tolist():
         scene = horizon("case_01", 0.1, f"left_arm.velocity_m_per_s={speed!r}", f"object.velocity_m_per_s={-speed!r}")
         motion = simulate(scene, method=name, setting=1e-3, grid=[0.0, 0.0, 0.1])
@@ -138,7 +138,6 @@ def test_the_first_state_is_the_initial_one(name: str) -> None:
 
 
 def test_an_event_is_not_met_again_in_a_step_that_comes_back_to_it() -> None:
-    """6 of 100 such scenes ended STALLED after a hundred events at one instant: a root search ended where it began."""
     rng = np.random.default_rng(3)
     for _ in range(20):
         scene = horizon("case_04", 2.0)
@@ -152,7 +151,7 @@ def test_an_event_is_not_met_again_in_a_step_that_comes_back_to_it() -> None:
 
 
 def test_events_at_one_instant_end_a_fixed_step_too() -> None:
-    """An unstable step: out of contact and back a million times, until there was no room for more."""
+    """An unstable step: out of contact and back a million times."""
     scene = scenes.load("case_07", [
         "time.duration_s=5", "left_arm.damping_Ns_per_m=0.1357635166552581",
         "left_arm.velocity_m_per_s=-0.6249738869723416", "right_arm.mass_kg=0.3853191693626619",

@@ -204,7 +204,6 @@ BALANCED = 0.008672840992886245  # m, of the arms of `preload`
 def test_a_run_that_rests_from_the_start_has_extremes(
     name: str, starts: dict[str, float], known: dict[str, float], sampled: bool
 ) -> None:
-    """Nobody had seen a segment, and the largest input was infinite."""
     still = {"object.velocity_m_per_s": 0.0} if name == "friction_slide" else {}
     scene = scenes.load(name).changed({f"{arm}.position_m": x for arm, x in starts.items()} | still)
     assert simulate(scene).at_rest == 0.0

@@ -44,7 +44,7 @@ def test_outcomes_are_those_of_a_simulation_and_bounds_are_kept() -> None:
 
 
 def test_a_search_does_not_end_where_many_choices_are_alike() -> None:
-    """Of most gains nothing touches, and the object stays; half of the seeds ended there."""
+    """Of most gains nothing touches, and the object stays."""
     bounds = {"touches": 2.0}
     found = [gr.design(gr.load("case_01", ["time.duration_s=3"]), {BOTH_KV: (0.5, 30.0)}, "x_object_end", bounds,
                        seed=seed).outcomes["x_object_end"] for seed in range(3)]
@@ -53,7 +53,7 @@ def test_a_search_does_not_end_where_many_choices_are_alike() -> None:
 
 @pytest.mark.parametrize("most", [30.0, 300.0])
 def test_an_outcome_that_a_small_part_of_a_range_has_is_found_by_every_seed(most: float) -> None:
-    """Gains from 4.97 to 6.11: some seeds ended at copies of one choice, elsewhere, others found none."""
+    """Gains from 4.97 to 6.11."""
     scene = gr.load("case_01", ["time.duration_s=1"])
     found = [gr.design(scene, {BOTH_KV: (0.5, most)}, "last_outside", seed=seed) for seed in range(4)]
     gains = np.linspace(4.9, 5.1, 2001)
@@ -123,7 +123,6 @@ def test_what_cannot_be_designed_is_refused(free: Any, minimise: str, bounds: An
 
 
 def test_a_bound_that_no_choice_keeps_is_named_where_the_outcome_is_missing_as_well() -> None:
-    """The message named the outcome alone: nothing had settled within 2 s."""
     scene = gr.load("case_01", ["time.duration_s=2"])
     with pytest.raises(gr.Refused, match=r"<= 0.001; the nearest has last_outside inf, peak_input 2\.5$"):
         gr.design(scene, {BOTH_KV: (1.0, 2.0)}, "last_outside", {"peak_input": 1e-3})
@@ -139,7 +138,6 @@ def test_runs_that_are_too_short_are_named_as_the_reason() -> None:
     ("last_outside_object", {}), ("last_outside", {"x_right_max": 1.0}),
 ])
 def test_an_outcome_of_a_body_that_the_scene_does_not_have_is_refused(minimise: str, bounds: Any) -> None:
-    """All choices were tried, and the reason was a mass outside its bound at the end of every run."""
     with pytest.raises(gr.Refused, match=r"outcome \w+: arm_alone has no such body; allowed: outcomes of those"):
         gr.design(gr.load("arm_alone"), {"left_arm.mass_kg": (1.0, 2.0)}, minimise, bounds)
 

@@ -115,18 +115,6 @@ def test_what_a_run_takes_its_file_gives_back(tmp_path: Path, settings: dict[str
     assert (again.setting, again.sampled) == (run.setting, run.sampled)
 
 
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [({"max_work": float("nan")}, "max_work: nan"), ({"max_events": "9"}, "max_events: '9'"),
-     ({"max_events": 2.5}, "max_events: 2.5"), ({"max_events": True}, "max_events: True"),
-     ({"setting": "1e-9"}, "exact: accuracy: '1e-9'"),
-     ({"method": "rk4", "setting": "1"}, "rk4: step: '1'"), ({"max_work": -1}, "max_work: -1")],
-)
-def test_settings_that_are_none(settings: dict[str, Any], words: str) -> None:
-    with pytest.raises(Refused, match=rf"^{words} is"):
-        simulate(CASE, **settings)
-
-
 NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
     (lambda changes: ensemble(CASE, changes), [1], "changes: [1]"),
     (lambda setup: ensemble(CASE, {}, setup=setup), {}, "setup: dict"),
@@ -148,6 +136,12 @@ NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
     (lambda scene: design(scene, {GAIN: (1, 2)}, "touches"), "case_01", "scene: str"),
     (lambda keys: ensemble(CASE, {}, sensitivity=keys), [3], "sensitivity: [3]"),
     (lambda method: simulate(CASE, method=method), [], "method: list"),
+    (lambda method: simulate(CASE, method=method), "euler", "method 'euler'"),
+    *((lambda settings: simulate(CASE, **settings), settings, words) for settings, words in (
+        ({"max_work": float("nan")}, "max_work: nan"), ({"max_events": "9"}, "max_events: '9'"),
+        ({"max_events": 2.5}, "max_events: 2.5"), ({"max_events": True}, "max_events: True"),
+        ({"setting": "1e-9"}, "exact: accuracy: '1e-9'"), ({"method": "rk4", "setting": "1"}, "rk4: step: '1'"),
+        ({"max_work": -1}, "max_work: -1"))),
     (lambda progress: simulate(CASE, progress=progress), 1, "progress: 1"),
     (lambda progress: ensemble(CASE, {}, progress=progress), "yes", "progress: 'yes'"),
     (lambda progress: design(CASE, {GAIN: (1, 2)}, "touches", progress=progress), [], "progress: []"),

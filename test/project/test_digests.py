@@ -20,7 +20,7 @@ LOOSE = 1e-6  # of the largest number of a state: what the scenes make of last b
 @pytest.mark.slow
 @pytest.mark.parametrize("script", ["project/digests.py", "exact/mutants.py"])
 def test_a_script_measures_the_checkout_that_it_stands_in(tmp_path: Path, script: str) -> None:
-    """What was installed was measured, before and after a change."""
+    """Not what is installed."""
     code = "import runpy, sys; runpy.run_path(sys.argv[1]); import grasp_ros; print(grasp_ros.__file__)"
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     found = subprocess.run([sys.executable, "-c", code, FILE.parents[1] / script], cwd=tmp_path, env=environment,

@@ -1,17 +1,15 @@
-"""Files from strangers: each of these once ended in a traceback, a hang, gigabytes, or was taken for valid."""
+"""Files from strangers: none may end in a traceback, a hang or gigabytes, or be taken for valid."""
 
 from __future__ import annotations
 
 import io
 import json
 import os
-import re
 import subprocess
 import sys
 import threading
 import time
 import zipfile
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -54,30 +52,27 @@ def test_only_a_plain_number_is_a_number(value: str) -> None:
     assert said(CASE.replace(DURATION, f"duration_s: {value}")).startswith("mine.yaml: ")
 
 
-@pytest.mark.parametrize(
-    ("text", "complaint"),
-    [
-        ("!!map\n" + CASE, "a tag"),
-        ("a: &a [x]\nb: [" + ", ".join(["*a"] * 9) + "]\n", "an anchor or alias"),
-        ("title: &a [*a]\n", "an anchor or alias"),
-        ("%YAML 1.1\n---\n" + CASE, "a directive"),
-        ("%TAG ! tag:x,2000:\n---\n" + CASE, "a directive"),
-        (CASE + "---\na: 1\n", "single document"),
-        (CASE + "<<: {tilt: {angle_rad: 0.1}}\n", "<<: unknown key"),
-        ("[" * 100_000, "nested too deeply"),
-        ("{a: " * 100_000, "nested too deeply"),
-        ("- " * 100_000, "nested too deeply"),
-        ("? " * 100_000, "nested too deeply"),
-        ("title: [" + "1," * 300_000, f"more than {MOST_NODES}"),
-        ("x" * 2_000_000, "larger than"),
-        (CASE.replace("title: ", 'title: "\\ud800" #'), "without control characters"),
-        (CASE.replace("title: ", 'title: "\\e]0;owned\\a" #'), "without control characters"),
-        (CASE.replace("title: ", "title: ['" + "x" * 100_000 + "'] #"), "is not allowed"),
-        (CASE + "\0", "special characters are not allowed"), (CASE + "loop: {", "column 8: loop: {"),
-        ('title: x\nwatch: "\\UFFFFFFFF"\n', "line 2: a value cannot be read: "),
-        ('title: x\nwatch: "\\U00110000"\n', "line 2: a value cannot be read: "),
-    ],
-)
+@pytest.mark.parametrize(("text", "complaint"), [
+    ("!!map\n" + CASE, "a tag"),
+    ("a: &a [x]\nb: [" + ", ".join(["*a"] * 9) + "]\n", "an anchor or alias"),
+    ("title: &a [*a]\n", "an anchor or alias"),
+    ("%YAML 1.1\n---\n" + CASE, "a directive"),
+    ("%TAG ! tag:x,2000:\n---\n" + CASE, "a directive"),
+    (CASE + "---\na: 1\n", "single document"),
+    (CASE + "<<: {tilt: {angle_rad: 0.1}}\n", "<<: unknown key"),
+    ("[" * 100_000, "nested too deeply"),
+    ("{a: " * 100_000, "nested too deeply"),
+    ("- " * 100_000, "nested too deeply"),
+    ("? " * 100_000, "nested too deeply"),
+    ("title: [" + "1," * 300_000, f"more than {MOST_NODES}"),
+    ("x" * 2_000_000, "larger than"),
+    (CASE.replace("title: ", 'title: "\\ud800" #'), "without control characters"),
+    (CASE.replace("title: ", 'title: "\\e]0;owned\\a" #'), "without control characters"),
+    (CASE.replace("title: ", "title: ['" + "x" * 100_000 + "'] #"), "is not allowed"),
+    (CASE + "\0", "special characters are not allowed"), (CASE + "loop: {", "column 8: loop: {"),
+    ('title: x\nwatch: "\\UFFFFFFFF"\n', "line 2: a value cannot be read: "),
+    ('title: x\nwatch: "\\U00110000"\n', "line 2: a value cannot be read: "),
+])
 def test_yaml_that_a_scene_does_not_need_is_refused(text: str, complaint: str) -> None:
     assert complaint in said(text)
 
@@ -126,20 +121,17 @@ def store(path: Path, arrays: dict[str, np.ndarray], **members: bytes | None) ->
     return path
 
 
-@pytest.mark.parametrize(
-    ("members", "complaint"),
-    [
-        ({"t": None}, "digest: "), ({"more": b"x"}, "more: not a NumPy array"), ({"t": b""}, "t: not a NumPy array"),
-        ({"t": header("'|O'", "(5,)") + b"cos\nsystem\n(S'true'\ntR."}, "t: Object arrays cannot be loaded"),
-        ({"t": header("'<f8'", "(1000000000000,)")}, "t: (Unable to allocate|EOF)"),
-        ({"t": header("'<f8'", "(5000,)")}, "t: EOF"),
-        ({"t": header("'<f8'", "(-5,)")}, "t: negative"), ({"t": header("'<f8'", "5")}, "t: shape is not valid"),
-        ({"t": header("[('a', '<f8')]", "(5,)") + bytes(40)}, "digest: "),
-        ({"t": header("(" * 2000, "(5,)") + bytes(40)}, "t: .*(too many nested|EOF in)"),
-        ({"t": header("'<f8', 'x': __import__('os')", "(5,)") + bytes(40)}, "t: malformed"),
-        ({"scene": header("'<U1'", "()") + b"\xff\xff\xff\xff"}, "invalid maximum character"),
-    ],
-)
+@pytest.mark.parametrize(("members", "complaint"), [
+    ({"t": None}, "digest: "), ({"more": b"x"}, "more: not a NumPy array"), ({"t": b""}, "t: not a NumPy array"),
+    ({"t": header("'|O'", "(5,)") + b"cos\nsystem\n(S'true'\ntR."}, "t: Object arrays cannot be loaded"),
+    ({"t": header("'<f8'", "(1000000000000,)")}, "t: (Unable to allocate|EOF)"),
+    ({"t": header("'<f8'", "(5000,)")}, "t: EOF"),
+    ({"t": header("'<f8'", "(-5,)")}, "t: negative"), ({"t": header("'<f8'", "5")}, "t: shape is not valid"),
+    ({"t": header("[('a', '<f8')]", "(5,)") + bytes(40)}, "digest: "),
+    ({"t": header("(" * 2000, "(5,)") + bytes(40)}, "t: .*(too many nested|EOF in)"),
+    ({"t": header("'<f8', 'x': __import__('os')", "(5,)") + bytes(40)}, "t: malformed"),
+    ({"scene": header("'<U1'", "()") + b"\xff\xff\xff\xff"}, "invalid maximum character"),
+])
 def test_arrays_that_numpy_does_not_write_are_refused(
     tmp_path: Path, arrays: dict[str, np.ndarray], members: dict[str, bytes | None], complaint: str
 ) -> None:
@@ -147,22 +139,19 @@ def test_arrays_that_numpy_does_not_write_are_refused(
         simulation.load(store(tmp_path / "a.npz", arrays, **members))
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("t", np.array(list("abcde"))), ("t", np.zeros(5, complex)), ("t", np.zeros(5, np.float32)),
-        ("t", np.arange(5)), ("t", np.arange(5.0, 0.0, -1.0)), ("t", np.array([0.0, 1.0, 2.0, 3.0, 21.0])),
-        ("t", np.array([0.0, 1.0, np.nan, 3.0, 4.0])), ("state", np.full((5, 6), np.inf)),
-        ("state", np.zeros((5, 6), ">f8")), ("events", np.full((1, 5), 9.0)), ("setting", np.array(-1.0)),
-        ("setting", np.array(np.nan)), ("sampled", np.array("yes")), ("work", np.full(4, -1)),
-        ("state", np.zeros((2, 6))), ("state", np.zeros((5, 5))), ("t", np.zeros((5, 1))), ("t", np.array(0.0)),
-        ("events", np.zeros(3)), ("events", np.zeros((3, 4))), ("command", np.zeros((5, 3))), ("scene", "title: 5"),
-        ("inputs", np.zeros((4, 3))), ("work", np.zeros(2)), ("method", "euler"), ("status", "FINE"),
-        ("setting", "fine"), ("setting", np.zeros(2)), ("work_names", np.array(["a"] * 4)),
-        ("touch_left", np.zeros(0)), ("status", np.array("DONE", dtype=object)), ("energy_of", "mine"),
-        ("events", np.zeros((3, 6))), ("work", np.zeros(8, np.int64)),
-    ],
-)
+@pytest.mark.parametrize(("name", "value"), [
+    ("t", np.array(list("abcde"))), ("t", np.zeros(5, complex)), ("t", np.zeros(5, np.float32)),
+    ("t", np.arange(5)), ("t", np.arange(5.0, 0.0, -1.0)), ("t", np.array([0.0, 1.0, 2.0, 3.0, 21.0])),
+    ("t", np.array([0.0, 1.0, np.nan, 3.0, 4.0])), ("state", np.full((5, 6), np.inf)),
+    ("state", np.zeros((5, 6), ">f8")), ("events", np.full((1, 5), 9.0)), ("setting", np.array(-1.0)),
+    ("setting", np.array(np.nan)), ("sampled", np.array("yes")), ("work", np.full(4, -1)),
+    ("state", np.zeros((2, 6))), ("state", np.zeros((5, 5))), ("t", np.zeros((5, 1))), ("t", np.array(0.0)),
+    ("events", np.zeros(3)), ("events", np.zeros((3, 4))), ("command", np.zeros((5, 3))), ("scene", "title: 5"),
+    ("inputs", np.zeros((4, 3))), ("work", np.zeros(2)), ("method", "euler"), ("status", "FINE"),
+    ("setting", "fine"), ("setting", np.zeros(2)), ("work_names", np.array(["a"] * 4)),
+    ("touch_left", np.zeros(0)), ("status", np.array("DONE", dtype=object)), ("energy_of", "mine"),
+    ("events", np.zeros((3, 6))), ("work", np.zeros(8, np.int64)),
+])
 def test_numbers_that_no_run_has_are_refused(
     tmp_path: Path, arrays: dict[str, np.ndarray], name: str, value: Any
 ) -> None:
@@ -171,24 +160,17 @@ def test_numbers_that_no_run_has_are_refused(
         simulation.load(tmp_path / "a.npz")
 
 
-@pytest.mark.parametrize(("name", "shape"), [("command", (4, 2)), ("command", (5, 3)), ("inputs", (5, 2))])
-def test_commands_that_do_not_go_with_the_times_of_a_sampled_run_are_refused(
+@pytest.mark.parametrize(("name", "shape"), [("command", (4, 2)), ("command", (5, 3)), ("inputs", (5, 2)),
+                                             ("state", (1, 6))])
+def test_rows_that_do_not_go_with_the_times_of_a_sampled_run_are_refused(
     tmp_path: Path, name: str, shape: tuple[int, int]
 ) -> None:
     simulate(scenes.load("arm_alone"), grid=np.linspace(0.0, 1.0, 5), sampled=True).save(tmp_path / "a.npz")
     with np.load(tmp_path / "a.npz") as data:
         arrays = {**data, name: np.zeros(shape)}
     np.savez(tmp_path / "b.npz", **signed(arrays))
-    with pytest.raises(Refused, match=rf"b\.npz: not a file of .*: {name}: shape .* not allowed; allowed: \(5, [23]\)"):
+    with pytest.raises(Refused, match=rf"b\.npz: not a file of .*: {name}: shape .* allowed; allowed: \(5, [236]\)"):
         simulation.load(tmp_path / "b.npz")
-
-
-def test_a_sampled_run_with_fewer_states_than_times_is_refused(tmp_path: Path) -> None:
-    """One state was taken, and tables of the run were a traceback; so were events with a sixth number."""
-    run = simulate(scenes.load("arm_alone"), grid=np.linspace(0.0, 1.0, 5), sampled=True)
-    replace(run, state=run.state[:1]).save(tmp_path / "a.npz")
-    with pytest.raises(Refused, match=re.escape("state: shape (1, 6) is not allowed; allowed: (5, 6)")):
-        simulation.load(tmp_path / "a.npz")
 
 
 def test_an_encrypted_or_swollen_result_is_refused(

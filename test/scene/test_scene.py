@@ -9,9 +9,7 @@ import pytest
 from documents import BASE, document, text_with
 from oracles import CASES
 
-from grasp_ros import scene as scenes
 from grasp_ros.scene import Scene, load, parse
-from grasp_ros.scene.validation import SceneError
 
 
 def bits(scene: Scene) -> list[str]:
@@ -49,10 +47,6 @@ TABLE_1 = {
 }
 
 
-def test_all_cases_are_there() -> None:
-    assert set(CASES) < set(scenes.names())
-
-
 @pytest.mark.parametrize("name", CASES)
 def test_numbers_of_the_paper(name: str) -> None:
     expected = {section: dict(table) for section, table in TABLE_1.items()}
@@ -70,17 +64,15 @@ def test_numbers_of_the_paper(name: str) -> None:
     assert scene.time_of(scene.ticks) == 20.0
 
 
-@pytest.mark.parametrize("value", [0.1 + 0.2, 1e-30, 1.2e-29, 123456789.123456789, 1 / 3, 2.0**-40, 1e5, 1e16, 1e8 + 1])
-def test_round_trip_of_awkward_numbers(value: float) -> None:
-    scene = parse(document("left_arm", "stiffness_N_per_m", min(value, 1e12)), "odd", "odd.yaml")
-    again = parse(scene.to_yaml(), "odd", "odd.yaml")
-    assert bits(again) == bits(scene)
-
-
-@pytest.mark.parametrize("negative", ["-0.0", "-1e-30"])
-def test_round_trip_keeps_signs(negative: str) -> None:
-    scene = parse(document("object", "velocity_m_per_s", float(negative)), "odd", "odd.yaml")
-    assert parse(scene.to_yaml(), "odd", "odd.yaml").values["object"]["velocity_m_per_s"].hex() == float(negative).hex()
+@pytest.mark.parametrize(("section", "key", "value"), [
+    *(("left_arm", "stiffness_N_per_m", value)
+      for value in (0.1 + 0.2, 1e-30, 1.2e-29, 123456789.123456789, 1 / 3, 2.0**-40, 1e5, 1e12, 1e8 + 1)),
+    ("object", "velocity_m_per_s", -0.0), ("object", "velocity_m_per_s", -1e-30),
+])
+def test_round_trip_of_awkward_numbers(section: str, key: str, value: float) -> None:
+    scene = parse(document(section, key, value), "odd", "odd.yaml")
+    assert scene.values[section][key].hex() == value.hex()
+    assert bits(parse(scene.to_yaml(), "odd", "odd.yaml")) == bits(scene)
 
 
 @pytest.mark.parametrize(
@@ -125,13 +117,3 @@ def test_files_and_names(tmp_path: Path) -> None:
     scene = load(str(path))
     assert scene.name == "mine"
     assert bits(scene) == bits(load("case_04"))
-    with pytest.raises(SceneError, match="no such file"):
-        load(str(tmp_path / "none.yaml"))
-    with pytest.raises(SceneError, match="did you mean case_09"):
-        load("case_99")
-    path.write_bytes(b"title: \xff\xfe\n")
-    with pytest.raises(SceneError, match=r"mine\.yaml"):
-        load(str(path))
-    (tmp_path / "dir.yaml").mkdir()
-    with pytest.raises(SceneError, match="is no file"):
-        load(str(tmp_path / "dir.yaml"))

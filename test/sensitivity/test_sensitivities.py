@@ -141,7 +141,6 @@ def test_an_object_that_stops_just_when_inputs_change_is_flagged() -> None:
 
 
 def test_the_first_state_of_an_object_that_sticks_at_once_follows_what_it_begins_with() -> None:
-    """All its derivatives at t = 0 were 0, as they are from then on."""
     key = ["object.velocity_m_per_s"]
     run = simulate(scenes.load("friction"), grid=np.array([0.0, 1e-3]), sensitivity=key)
     assert run.sensitivity is not None
@@ -230,7 +229,7 @@ def test_rates_of_the_energy(name: str, key: str, width: float) -> None:
     ("delay", "left_sensor.position_noise_m", "no derivative at 0"),
 ])
 def test_what_has_no_derivative_is_refused(name: str, key: str, word: str) -> None:
-    """Friction and noise of 0 are left out of the system: derivatives by them were 0."""
+    """Friction and noise of 0 are left out of the system."""
     off = [f"{key}=0"] if word.endswith("at 0") else []
     scene = scenes.load(name, [*off, "left_sensor.noise_seed=3"] if "noise" in key else off)
     with pytest.raises(Refused, match=word):
@@ -312,7 +311,7 @@ def test_spectrum_of_tangents_that_grow_and_fall_again_within_a_piece() -> None:
 
 @pytest.mark.parametrize("duration", [1.0, 4.0])
 def test_spectrum_of_an_object_that_sticks_is_that_of_the_directions_that_are_left(duration: float) -> None:
-    """One in their midst that was lost once took a part of those behind it along."""
+    """The one that is lost may be in their midst."""
     scene = horizon("friction", duration)
     keys = ("left_arm.position_m", "left_arm.velocity_m_per_s", "object.position_m", "right_arm.position_m",
             "right_arm.velocity_m_per_s")

@@ -35,16 +35,13 @@ def test_a_page_has_its_pictures_inside_and_bodies_may_be_absent(tmp_path: Path)
     assert [path.name for path in tmp_path.iterdir()] == ["hit.html"]
 
 
-@pytest.mark.parametrize(
-    ("name", "how", "sentence"),
-    [
-        ("a.png", {}, r"a\.png: \.png is not allowed; allowed: \.gif, \.html"),
-        ("a", {}, "needs an ending"),
-        ("a.gif", {"speed": 0.0}, "speed: 0.0 is not allowed"),
-        ("a.gif", {"speed": 1e-4}, "pictures; allowed: at most"),
-        ("no/a.gif", {"span": (0.0, 0.05)}, "cannot be written: No such file"),
-    ],
-)
+@pytest.mark.parametrize(("name", "how", "sentence"), [
+    ("a.png", {}, r"a\.png: \.png is not allowed; allowed: \.gif, \.html"),
+    ("a", {}, "needs an ending"),
+    ("a.gif", {"speed": 0.0}, "speed: 0.0 is not allowed"),
+    ("a.gif", {"speed": 1e-4}, "pictures; allowed: at most"),
+    ("no/a.gif", {"span": (0.0, 0.05)}, "cannot be written: No such file"),
+])
 def test_what_cannot_be_drawn_is_refused(tmp_path: Path, name: str, how: dict[str, Any], sentence: str) -> None:
     with pytest.raises(Refused, match=sentence):
         animate(simulate(case_of()), tmp_path / name, **how)

@@ -49,7 +49,6 @@ def test_impulses_are_the_change_of_momentum_and_losses_those_of_the_run(kind: s
 
 
 def test_contacts_are_as_their_scenes_say() -> None:
-    """`hammer` once said that the arm loses the momentum of the object, `v_jump_one_sided` that one pair is clamped."""
     run = simulate(scene.load("hammer"))
     hit = run.contacts("left")[0]
     before, after = run.at([hit["begin"], hit["end"]])  # both masses are 1 kg
@@ -140,7 +139,7 @@ def test_no_contact_is_an_empty_table_and_no_side_is_refused() -> None:
 
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-6, 1e-9])
 def test_an_impact_is_off_by_a_few_accuracies(accuracy: float) -> None:
-    """Of two bodies that nothing else moves; it was by a hundred, and at 1e-3 it gave energy."""
+    """Of two bodies that nothing else moves."""
     for loss in np.logspace(-2.5, 0.5, 25).tolist():
         hit = made(1.0, 0.01, left_arm=body(1.0, -0.001, 1.0), object=body(1.0),
                    left_contact={"hertz_N_per_m1_5": 1e4, "dissipation_s_per_m": loss})

@@ -186,23 +186,20 @@ def test_what_a_controller_raises_passes_through_with_its_tick(compiled: bool) -
     assert note == f"right controller {__name__}:fails_at_seven, tick 7, t = 0.007 s"
 
 
-@pytest.mark.parametrize(
-    ("law", "words"),
-    [
-        (answers_nan, "returned nan at tick 7, t = 0.007 s; allowed: a finite number of N"),
-        (numba.njit(answers_nan), "returned nan at tick 7, t = 0.007 s; allowed: a finite number of N"),
-        (lambda *_: "much", "returned 'much' at tick 0, t = 0.0 s; allowed: a finite number of N"),
-        (lambda *_: None, "returned None at tick 0"),
-        (numba.njit(lambda tick, time, x, v: 1.0 if tick < 3 else None), "returned None at tick 3"),
-        (lambda *_: np.zeros(1), "returned array"), (lambda *_: np.True_, "returned np.True_"),
-        (lambda *_: -math.inf, "returned -inf"),
-        (numba.njit(lambda tick, time, x, v: "much"), "float(int, float, float, float): No conversion from "),
-        *((law, "too many positional arguments; allowed: a callable of tick, time, x and v")
-          for law in (numba.njit(lambda x: x), lambda x: x, math.sin)),
-        (lambda tick, time, x, v, more: 0.0, "missing a required argument: 'more'; allowed: a callable of tick"),
-        (3.0, "left: 3.0 is not allowed; allowed: a callable of tick, time, x and v"),
-    ],
-)
+@pytest.mark.parametrize(("law", "words"), [
+    (answers_nan, "returned nan at tick 7, t = 0.007 s; allowed: a finite number of N"),
+    (numba.njit(answers_nan), "returned nan at tick 7, t = 0.007 s; allowed: a finite number of N"),
+    (lambda *_: "much", "returned 'much' at tick 0, t = 0.0 s; allowed: a finite number of N"),
+    (lambda *_: None, "returned None at tick 0"),
+    (numba.njit(lambda tick, time, x, v: 1.0 if tick < 3 else None), "returned None at tick 3"),
+    (lambda *_: np.zeros(1), "returned array"), (lambda *_: np.True_, "returned np.True_"),
+    (lambda *_: -math.inf, "returned -inf"),
+    (numba.njit(lambda tick, time, x, v: "much"), "float(int, float, float, float): No conversion from "),
+    *((law, "too many positional arguments; allowed: a callable of tick, time, x and v")
+      for law in (numba.njit(lambda x: x), lambda x: x, math.sin)),
+    (lambda tick, time, x, v, more: 0.0, "missing a required argument: 'more'; allowed: a callable of tick"),
+    (3.0, "left: 3.0 is not allowed; allowed: a callable of tick, time, x and v"),
+])
 def test_what_is_no_controller_is_refused(law: Any, words: str) -> None:
     with pytest.raises(Refused) as refusal:
         simulate(scenes.load("case_01"), controllers={"left": law})

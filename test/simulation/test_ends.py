@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
-from documents import case_of
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact import integrator
 from grasp_ros.exact.integrator import Status
 from grasp_ros.physics.layout import OBJECT, Of, Work
-from grasp_ros.simulation import GRID_POINTS, load, simulate
+from grasp_ros.simulation import simulate
 
 
 @pytest.mark.parametrize("sampled", [False, True])
@@ -53,12 +51,3 @@ def test_a_run_that_takes_breath_gives_the_same_bits(monkeypatch: pytest.MonkeyP
     np.testing.assert_array_equal(pieces.state, whole.state)
     np.testing.assert_array_equal(pieces.event_table, whole.event_table)
     np.testing.assert_array_equal(pieces.work, whole.work)
-
-
-def test_budget_ends_a_run_with_its_status(tmp_path: Path) -> None:
-    scene = case_of("case_02", 3000.0, 1.0)
-    result = simulate(scene, max_events=1500)
-    assert result.status is Status.EVENT_BUDGET
-    assert 0 < len(result.t) == len(result.state) == len(result.command) < GRID_POINTS
-    result.save(tmp_path / "cut.npz")
-    assert load(tmp_path / "cut.npz").status is Status.EVENT_BUDGET

@@ -62,15 +62,12 @@ def test_a_set_point_is_a_constant_force() -> None:
     assert there.state.tobytes() == force.state.tobytes()
 
 
-@pytest.mark.parametrize(
-    ("section", "impulse"),
-    [
-        ({"object_pulse": {"force_N": 3.0, "start_s": 0.5, "length_s": 0.25}}, 0.75),
-        ({"object_table": {"time_s": [0.1, 0.3, 0.7], "force_N": [1.0, -2.0, 4.0]}}, 0.2 - 0.8 + 1.2),
-        ({"object_pulse": {"force_N": 3.0, "start_s": 0.5, "length_s": 0.25},
-          "object_table": {"time_s": [0.1], "force_N": [1.0]}}, 0.75 + 0.9),
-    ],
-)
+@pytest.mark.parametrize(("section", "impulse"), [
+    ({"object_pulse": {"force_N": 3.0, "start_s": 0.5, "length_s": 0.25}}, 0.75),
+    ({"object_table": {"time_s": [0.1, 0.3, 0.7], "force_N": [1.0, -2.0, 4.0]}}, 0.2 - 0.8 + 1.2),
+    ({"object_pulse": {"force_N": 3.0, "start_s": 0.5, "length_s": 0.25},
+      "object_table": {"time_s": [0.1], "force_N": [1.0]}}, 0.75 + 0.9),
+])
 def test_external_forces_give_their_impulse(section: dict[str, dict[str, object]], impulse: float) -> None:
     scene = made(1.0, 0.01, object=body(2.0, 0.0, 1.0), **section)
     for sampled in (False, True):

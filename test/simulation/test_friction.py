@@ -139,7 +139,7 @@ def test_an_object_pushed_by_exactly_its_friction_sticks(beside: int) -> None:
 
 
 def test_no_accuracy_lets_the_object_slip_twice_for_once() -> None:
-    """The force of the series and that of the state differ by the accuracy: half of such runs at 1e-5 slipped twice."""
+    """The force of the series and that of the state differ by the accuracy."""
     rng = np.random.default_rng(7)
     scene = scenes.load("friction", ["time.duration_s=5"])
     numbers = {f"{section}.{key}": value for section, keys in scene.values.items() if section != "time"

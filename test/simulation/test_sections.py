@@ -95,17 +95,14 @@ def test_a_graze_that_does_not_cross_is_no_crossing() -> None:
     assert run.section(lambda t, y: (t - 1.0) ** 2 - 1e-8).t == pytest.approx([0.9999, 1.0001], abs=1e-10)
 
 
-@pytest.mark.parametrize(
-    ("section", "direction", "sentence"),
-    [
-        ([1.0, 2.0], 0, "six weights of the state"), (np.zeros(6), 0, "not all 0"), (V_O, 2, "direction: 2"),
-        (None, 0, "six weights of the state"), ("x", 0, "six weights of the state"),
-        (lambda t, y: 1j * t, 0, "gives complex numbers; allowed: a finite number for each"),
-        (lambda t, y: y, 0, "a finite number for each"),
-        (lambda t, y: np.full_like(t, np.nan), 0, "not finite, as the state of a body that is not there"),
-        (lambda t, y: None, 0, "a finite number for each"),
-    ],
-)
+@pytest.mark.parametrize(("section", "direction", "sentence"), [
+    ([1.0, 2.0], 0, "six weights of the state"), (np.zeros(6), 0, "not all 0"), (V_O, 2, "direction: 2"),
+    (None, 0, "six weights of the state"), ("x", 0, "six weights of the state"),
+    (lambda t, y: 1j * t, 0, "gives complex numbers; allowed: a finite number for each"),
+    (lambda t, y: y, 0, "a finite number for each"),
+    (lambda t, y: np.full_like(t, np.nan), 0, "not finite, as the state of a body that is not there"),
+    (lambda t, y: None, 0, "a finite number for each"),
+])
 def test_what_is_no_section_is_refused(section: Any, direction: int, sentence: str) -> None:
     with pytest.raises(Refused, match=sentence):
         simulate(case_of()).section(section, direction=direction)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from documents import case_of
+from documents import case_of, horizon
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status
@@ -34,7 +34,7 @@ def test_continuous_is_the_integrator() -> None:
 @pytest.mark.parametrize("grid", [[0.0, 2.1], [-0.1, 1.0], [1.0, 0.5], [0.0, np.nan], [0.0, np.inf], [2.0000000001]])
 @pytest.mark.parametrize("sampled", [False, True])
 def test_bad_grids_are_refused(grid: Any, sampled: bool) -> None:
-    with pytest.raises(ValueError, match="grid"):
+    with pytest.raises(Refused, match="grid"):
         simulate(case_of(), grid=np.array(grid), sampled=sampled)
 
 
@@ -105,11 +105,17 @@ def test_file_holds_everything(tmp_path: Path, name: str, sampled: bool) -> None
     assert load(path) == result
 
 
-def test_file_of_a_run_without_events(tmp_path: Path) -> None:
-    result = simulate(case_of(duration=0.1), grid=np.zeros(0))
-    result.save(tmp_path / "none.npz")
-    assert load(tmp_path / "none.npz") == result
-    assert result.events == []
+@pytest.mark.parametrize(("name", "seconds", "grid", "rests"), [
+    ("case_01", 0.1, [], False), ("preload", 100.0, None, True),
+])
+def test_file_of_a_run_without_events_or_with_a_rest(
+    tmp_path: Path, name: str, seconds: float, grid: Any, rests: bool
+) -> None:
+    result = simulate(horizon(name, seconds), grid=grid)
+    result.save(tmp_path / "run.npz")
+    again = load(tmp_path / "run.npz")
+    assert again == result
+    assert (again.events == [], again.at_rest is not None) == (not rests, rests)
 
 
 def test_the_name_of_a_scene_is_no_scene() -> None:
