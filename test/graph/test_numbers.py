@@ -223,11 +223,13 @@ def test_a_bag_with_a_reset_may_be_written_anew(tmp_path: Path, run: Trajectory,
     rewritten(tmp_path / "bag" / "bag.mcap", tmp_path / "new.mcap")
     found = bag.read(tmp_path / "new.mcap")
     assert (found.resets, verify(found).ticks, verify(found).problem) == (1, 22, "")
-    row, state = int(found.starts[1]) + 2, found.state.copy()
-    state[row].view(np.int64)[4] ^= 1
-    (x, other), tick = (float(states[row, 4]) for states in (found.state, state)), found.tick[row]
-    words = f"joint_states, right position: recorded {other!r} ({other.hex()}), computed {x!r} ({x.hex()})"
-    assert verify(replace(found, state=state)).words == f"NOT EQUAL, first at tick {tick}, {words}"
+    row = int(found.starts[1]) + 2
+    for column, name in enumerate(f"{body} {part}" for body in NAMES.values() for part in ("position", "velocity")):
+        state = found.state.copy()
+        state[row].view(np.int64)[column] ^= 1
+        (x, other), tick = (float(states[row, column]) for states in (found.state, state)), found.tick[row]
+        words = f"joint_states, {name}: recorded {other!r} ({other.hex()}), computed {x!r} ({x.hex()})"
+        assert verify(replace(found, state=state)).words == f"NOT EQUAL, first at tick {tick}, {words}"
 
 
 @pytest.mark.parametrize(("times", "why"), [

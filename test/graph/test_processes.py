@@ -23,12 +23,6 @@ from grasp_ros.scene.topics import JOINT_STATES
 
 pytestmark = pytest.mark.slow
 
-TERMINAL = """
-import fcntl, os, sys, termios
-fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-os.execv(sys.argv[1], sys.argv[1:])
-"""
-
 
 def check_bag(directory: Path) -> None:
     """It was closed, and lacks nothing."""
@@ -78,8 +72,8 @@ def test_nothing_outlives_a_run_that_is_killed(grasp_run: Any, tmp_path: Path, o
 @pytest.mark.usefixtures("survivors")
 def test_a_terminal_that_is_closed_ends_a_run_cleanly(launch: Any, tmp_path: Path) -> None:
     ours, theirs = os.openpty()
-    words = [sys.executable, "-c", TERMINAL, *GRASP, "run", "case_01", "-o", "run"]
-    run = launch(*words, cwd=tmp_path, stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True)
+    words = ["setsid", "-c", *GRASP, "run", "case_01", "-o", "run"]  # whose terminal is that of its input
+    run = launch(*words, cwd=tmp_path, stdin=theirs, stdout=theirs, stderr=theirs)
     os.close(theirs)
     growing(tmp_path / "run" / "bag", 300_000)
     os.close(ours)

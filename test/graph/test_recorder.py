@@ -466,7 +466,6 @@ def test_a_full_disk_ends_the_bag_while_there_is_room(tmp_path: Path) -> None:
 def test_a_disk_that_is_full_at_the_first_byte_is_left_as_it_was(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Trajectory
 ) -> None:
-    """The next one, with space, was told that the directory is there."""
     def full(*_: Any, **__: Any) -> None:
         raise OSError(28, "No space left on device")
 

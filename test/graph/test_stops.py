@@ -32,14 +32,6 @@ from lab.drills import recorder
 pytestmark = pytest.mark.slow
 
 
-def _words(process: str) -> str:
-    """Its command line; none of one that is gone."""
-    try:
-        return Path(f"/proc/{process}/cmdline").read_text()
-    except FileNotFoundError:
-        return ""
-
-
 @pytest.mark.parametrize(
     ("number", "moment"),
     [(signal.SIGINT, "recording"), pytest.param(signal.SIGHUP, "recording", marks=pytest.mark.thorough),
@@ -215,7 +207,7 @@ def test_a_process_that_a_law_has_left_ends_with_its_node(tmp_path: Path) -> Non
     found = ran(*GRASP, *words, "-o", "run", cwd=tmp_path)
     assert found.returncode == 0
     [left] = (tmp_path / "left").read_text().split()
-    assert "sleep" not in _words(left)
+    assert "sleep" not in ran("cat", f"/proc/{left}/cmdline").stdout  # which is empty, or gone
 
 
 @pytest.mark.parametrize(
