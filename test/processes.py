@@ -78,9 +78,9 @@ rclpy.spin(node)
 """
 
 
-def stranger(name: str, source: str) -> list[str]:
-    """What starts a node that is not of this package, of which this is the source."""
-    return [sys.executable, "-c", STRANGER.format(name) + source]
+def stranger(name: str, source: str, answers: bool = False) -> list[str]:
+    """What starts a node that is not of this package, of which this is the source; or its `force_for` a state."""
+    return [sys.executable, "-c", STRANGER.format(name) + source + answers * ANSWERS]
 
 
 def write_law(directory: Path, *lines: str) -> None:

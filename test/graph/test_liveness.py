@@ -15,21 +15,7 @@ import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from graphs import whole
-from processes import (
-    ANSWERS,
-    DEADLINE,
-    START,
-    Terminals,
-    children,
-    end_nodes,
-    ended,
-    growing,
-    more_ticks,
-    node_command,
-    stranger,
-    wait_for,
-    write_law,
-)
+from processes import DEADLINE, Terminals, children, ended, growing, more_ticks, node_command, wait_for, write_law
 from rclpy.executors import SingleThreadedExecutor
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -81,7 +67,7 @@ def test_who_waits_says_for_whom_and_goes_on_when_it_is_back(launch: Any, tmp_pa
         assert "this node was suspended for" in graph.said(name)
     graph.processes["right_controller"].kill()
     graph.wait_for("plant", r"right/effort_command: no (heartbeat|answer).* of /right_controller for 1\.\d s")
-    launch(*START, "right_controller", "--ros-args", "-p", "wait_for_monitor:=true", stderr=subprocess.DEVNULL)
+    launch(*node_command("right_controller", wait_for_monitor="true"), stderr=subprocess.DEVNULL)
     wait_for(lambda: "right/effort_command: is back after" in graph.said("plant"), "the one in its place")
     more_ticks(graph.file)
     graph.processes["plant"].send_signal(signal.SIGINT)
@@ -114,27 +100,6 @@ def test_a_run_ends_with_a_sentence(
     assert re.fullmatch(rf"grasp: .*({words}).*; run/bag has what was recorded", err.splitlines()[-1]), err
     whole(file.parent)
     assert (number == signal.SIGKILL) is not (file.parent / "metadata.yaml").exists()
-
-
-FORGETFUL = """
-lost = [0, 50_000_000, 200_000_000]
-def force_for(state):
-    if state.header.stamp.nanosec in lost:  # as if it had not come
-        lost.remove(state.header.stamp.nanosec)
-        return None
-    i = state.name.index("left")
-    return -5.0 * state.position[i] - 0.5 * state.velocity[i]
-"""
-
-
-def test_a_state_that_is_lost_comes_again_and_is_in_the_bag_once(launch: Any, grasp_run: Any, tmp_path: Path) -> None:
-    """With a controller that gives no sign of life."""
-    run = grasp_run("case_01", "--set", "time.duration_s=0.3", "--no-figure", "--without", "left_controller")
-    launch(*stranger("forgetful", FORGETFUL + ANSWERS), stderr=subprocess.DEVNULL)
-    ended(run)
-    recording = whole(tmp_path / "run" / "bag")
-    assert recording.tick.tolist() == list(range(301))
-    assert int(recording.lost["repeated messages"]) + int(recording.lost["repeated states"]) > 0
 
 
 def test_what_the_executor_was_not_told_of_is_found(make: Any, node: Any) -> None:
@@ -179,7 +144,8 @@ def test_who_prepares_is_waited_for_and_who_does_not_come_is_not(
     while time.monotonic() < end:
         executor.spin_once(timeout_sec=0.1)
     assert not controller.finished
-    end_nodes(other)
+    other.close()
+    other.destroy_node()
     wait_for(lambda: executor.spin_once(timeout_sec=0.1) or controller.finished, "its end")
     assert "timeout of 1.6 s" in controller.words
 

@@ -209,6 +209,7 @@ def test_help_names_what_can_be_set(
 ) -> None:
     """It starts no node."""
     plant, controller, _ = loop
+    monkeypatch.setattr(__main__, "note_signals", None)  # nothing comes that far
     ros = ("use_sim_time", "start_type_description_service", "qos_overrides")
     for name, node, later in (("plant", plant, {*FREE}), ("left_controller", controller, set())):
         declared = {key for key in node._parameters if not key.startswith(ros) and "." not in key}
@@ -217,7 +218,8 @@ def test_help_names_what_can_be_set(
         for words in (["--help"], ["-h", "--ros-args", "-p", "scene:=case_99"]):
             monkeypatch.setattr(sys, "argv", ["", name, *words])
             assert __main__.start() == 0
-            said = capsys.readouterr().out
+            said, err = capsys.readouterr()
+            assert not err
             assert said.startswith(f"usage: {name} ")
             assert all(f"  {key} " in said for key in NODES[name])
 
@@ -243,6 +245,7 @@ def test_where_no_graph_can_be_none_starts(
         assert found.returncode == 2
         assert f"{name}: {value!r} is not allowed" in found.stderr
         assert why in found.stderr
+    monkeypatch.setattr(__main__, "note_signals", None)  # nothing comes that far
     monkeypatch.setattr(sys, "argv", ["", "monitor"])
     assert __main__.start() == 2
     assert why in capsys.readouterr().err

@@ -23,7 +23,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
-from grasp_ros.graph.nodes.picture import ASIDE, NEWTONS_PER_METRE, TOUCHING, markers
+from grasp_ros.graph.nodes.picture import TOUCHING, markers
 from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.terminal import SIGNS, Moment, View
@@ -35,6 +35,7 @@ from grasp_ros.simulation import simulate
 
 pytestmark = pytest.mark.slow  # real processes
 TRACK = 72  # columns
+ASIDE, NEWTONS_PER_METRE = {"left": -0.06, "object": 0.0, "right": 0.06}, 100.0  # m; of an arrow
 CONFIG = Path(__file__).parents[2] / "config"
 
 

@@ -1,4 +1,4 @@
-"""What strangers send to a running graph: it counts it, says whose it may be, and lets none of it act."""
+"""What strangers send to a running graph, and what they fail to send: it is named, and nothing is lost."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import WrenchStamped
 from graphs import whole
-from processes import ANSWERS, DEADLINE, START, Terminals, ended, growing, more_ticks, stranger, wait_for
+from processes import DEADLINE, START, Terminals, ended, growing, more_ticks, stranger, wait_for
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
@@ -100,11 +100,32 @@ def test_a_command_beyond_the_actuator_is_named_and_does_not_act(
     launch: Any, grasp_run: Any, tmp_path: Path, kind: list[str]
 ) -> None:
     run = grasp_run("saturation", "--set", "time.duration_s=3.0", "--without", "left_controller", "--no-figure", *kind)
-    launch(*stranger("hard", HARD + ANSWERS), stderr=subprocess.DEVNULL)
+    launch(*stranger("hard", HARD, answers=True), stderr=subprocess.DEVNULL)
     _, err = ended(run)
     assert re.search(r"left/effort_command: commands beyond a limit: 1; sources: .*; -1000 N; allowed by the", err)
     recording = whole(tmp_path / "run" / "bag")
     assert set(recording.effort[:, LEFT]) <= {0.0, 0.25}
+
+
+FORGETFUL = """
+lost = [0, 50_000_000, 200_000_000]
+def force_for(state):
+    if state.header.stamp.nanosec in lost:  # as if it had not come
+        lost.remove(state.header.stamp.nanosec)
+        return None
+    i = state.name.index("left")
+    return -5.0 * state.position[i] - 0.5 * state.velocity[i]
+"""
+
+
+def test_a_state_that_is_lost_comes_again_and_is_in_the_bag_once(launch: Any, grasp_run: Any, tmp_path: Path) -> None:
+    """With a controller that gives no sign of life."""
+    run = grasp_run("case_01", "--set", "time.duration_s=0.3", "--no-figure", "--without", "left_controller")
+    launch(*stranger("forgetful", FORGETFUL, answers=True), stderr=subprocess.DEVNULL)
+    ended(run)
+    recording = whole(tmp_path / "run" / "bag")
+    assert recording.tick.tolist() == list(range(301))
+    assert int(recording.lost["repeated messages"]) + int(recording.lost["repeated states"]) > 0
 
 
 def test_whom_dds_does_not_connect_holds_nobody_up(grasp_run: Any, node: tuple[Any, Any]) -> None:
