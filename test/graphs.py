@@ -1,14 +1,14 @@
-"""Graphs that run at the same time, and bags without a graph."""
+"""Graphs that run, what holds of their bags, and bags without a graph."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import pytest
-from conftest import SECOND_DOMAIN
 from mcap.reader import make_reader
 from mcap.writer import Writer
 from processes import DEADLINE
@@ -17,6 +17,7 @@ from std_srvs.srv import Trigger
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.recorder import Recorder
 from grasp_ros.graph.bag.recording import Recording
+from grasp_ros.graph.bag.verify import verify
 from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.running import Running
 from grasp_ros.scene import Scene
@@ -35,6 +36,25 @@ def written(
     return path
 
 
+def whole(path: Path) -> Recording:
+    """A bag that lacks nothing, and follows from its inputs."""
+    recording = bag.read(path)
+    assert not any(recording.missing.values())
+    assert verify(recording).holds
+    return recording
+
+
+@contextmanager
+def started(graph: Graph) -> Iterator[dict[str, int]]:
+    """A graph that runs, and is stopped whatever happens; then its exit statuses are there."""
+    statuses = dict[str, int]()
+    try:
+        graph.start()
+        yield statuses
+    finally:
+        statuses.update(graph.stop())
+
+
 def call(service: str, node: tuple[Any, Any]) -> Any:
     """Answer of a service of the plant to a node, which has an executor."""
     peer, executor = node
@@ -47,18 +67,9 @@ def call(service: str, node: tuple[Any, Any]) -> Any:
     return future.result()
 
 
-def recordings_of(first: Graph, second: Graph, monkeypatch: pytest.MonkeyPatch) -> list[Recording]:
-    """Bags of two graphs, each in a ROS domain of its own."""
-    try:
-        first.start()
-        monkeypatch.setenv("ROS_DOMAIN_ID", SECOND_DOMAIN)
-        second.start()
-        first.wait([])
-        second.wait([])
-    finally:
-        first.stop()
-        second.stop()
-    return [bag.read(graph.bag) for graph in (first, second)]
+def status(node: tuple[Any, Any]) -> dict[str, Any]:
+    """What the plant says of itself to a node."""
+    return json.loads(call("status", node).message)  # type: ignore[no-any-return]
 
 
 def rewritten(

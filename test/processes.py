@@ -6,8 +6,9 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 DEADLINE = 60.0  # s
@@ -19,6 +20,14 @@ NODES = ("monitor", "left_controller", "right_controller", "plant")
 def ran(*words: str, **options: Any) -> subprocess.CompletedProcess[str]:
     """A process that has ended by itself, with what it said."""
     return subprocess.run(words, capture_output=True, text=True, timeout=DEADLINE, check=False, **options)
+
+
+def ended(process: Any, status: int = 0) -> tuple[str, str]:
+    """What a process has said by its end, which has this status and is no fault of ours."""
+    out, err = (words or "" for words in process.communicate(timeout=DEADLINE))
+    assert process.returncode == status, out + err
+    assert "Traceback" not in out + err
+    return out, err
 
 
 def wait_for(condition: Callable[[], bool], what: str) -> None:
@@ -46,16 +55,55 @@ def node_command(name: str, **numbers: object) -> list[str]:
     return [*START, name, "--ros-args", *(word for key, value in numbers.items() for word in ("-p", f"{key}:={value}"))]
 
 
-class Terminals:
-    """Four nodes, each with its terminal."""
+STRANGER = """
+import sys, time
+import rclpy
+from geometry_msgs.msg import WrenchStamped
+from sensor_msgs.msg import JointState
+rclpy.init()
+node = rclpy.create_node({!r})
+"""
+ANSWERS = """
+commands = node.create_publisher(WrenchStamped, "left/effort_command", 1000)
+def answer(state):
+    force = force_for(state)
+    if force is not None:
+        command = WrenchStamped(header=state.header)
+        command.wrench.force.x = force
+        commands.publish(command)
+while commands.get_subscription_count() < 2:  # plant and monitor
+    rclpy.spin_once(node, timeout_sec=0.01)
+node.create_subscription(JointState, "joint_states", answer, 1000)
+rclpy.spin(node)
+"""
 
-    def __init__(self, launch: Any, directory: Path, scene: str, options: Sequence[str] = ()) -> None:
+
+def stranger(name: str, source: str, answers: bool = False) -> list[str]:
+    """What starts a node that is not of this package, of which this is the source; or its `force_for` a state."""
+    return [sys.executable, "-c", STRANGER.format(name) + source + answers * ANSWERS]
+
+
+def write_law(directory: Path, *lines: str) -> None:
+    """A module `mine` whose `law` has the feedback of case 1, and does something before each answer: from line 3 on.
+
+    `seen` is a list that it keeps.
+    """
+    words = ["import os, sys, time", "def law(tick, t, x, v, seen=[]):", *(f"    {line}" for line in lines)]
+    (directory / "mine.py").write_text("\n".join([*words, "    return -5.0 * x - 0.5 * v\n"]))
+
+
+class Terminals:
+    """Four nodes, each with its terminal; parameters of the plant, and of all."""
+
+    def __init__(
+        self, launch: Any, directory: Path, plant: Mapping[str, object] = MappingProxyType({}), **everywhere: object
+    ) -> None:
         self.directory, self.processes = directory, {}
+        own = {"plant": {"scene": "case_01", **plant}, "monitor": {"bag": directory / "bag"}}
         for name in NODES:
-            own = {"plant": ["-p", f"scene:={scene}"], "monitor": ["-p", f"bag:={directory / 'bag'}"]}.get(name, [])
-            wait = [] if name == "monitor" else ["-p", "wait_for_monitor:=true"]
+            wait = {} if name == "monitor" else {"wait_for_monitor": "true"}
             with (directory / name).open("w") as log:
-                words = [*START, name, "--ros-args", *own, *wait, *options]
+                words = node_command(name, **own.get(name, {}), **wait, **everywhere)
                 self.processes[name] = launch(*words, stderr=log)
         self.file = growing(directory / "bag")
 

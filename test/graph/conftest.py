@@ -11,8 +11,9 @@ from typing import Any
 
 import pytest
 import rclpy
-from processes import DEADLINE, GRASP
+from processes import DEADLINE, GRASP, end_nodes
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
 
 from grasp_ros.exact.integrator import compile_kernels
 
@@ -64,6 +65,28 @@ def context() -> Iterator[rclpy.Context]:
     rclpy.init(context=context)
     yield context
     context.shutdown()
+
+
+@pytest.fixture
+def make(context: rclpy.Context) -> Iterator[Callable[..., Any]]:
+    """Makes nodes of the package within this process, with some parameters, and ends them."""
+    made: list[Any] = []
+
+    def call(kind: Callable[..., Any], *names: str, **numbers: Any) -> Any:
+        given = [Parameter(name, value=value) for name, value in numbers.items()]
+        made.append(kind(*names, context=context, parameter_overrides=given))
+        return made[-1]
+
+    yield call
+    end_nodes(*made)
+
+
+@pytest.fixture
+def executor(context: rclpy.Context) -> Iterator[SingleThreadedExecutor]:
+    """For nodes of `make`."""
+    executor = SingleThreadedExecutor(context=context)
+    yield executor
+    executor.shutdown()
 
 
 @pytest.fixture

@@ -7,19 +7,17 @@ import os
 import re
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from graphs import rewritten
+from graphs import rewritten, started, whole
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType
 from processes import DEADLINE, wait_for
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from sensor_msgs.msg import JointState
@@ -68,9 +66,6 @@ def test_an_input_that_differs_is_found_and_a_bag_may_end_early_but_lack_no_tick
     found = verify(replace(recording, effort=effort)).difference
     assert found is not None
     assert found[:3] in ((300, "joint_states", "left velocity"), (300, "joint_states", "left effort"))
-    state = recording.state.copy()
-    state[300, 2] = np.nextafter(state[300, 2], np.inf)
-    assert verify(replace(recording, state=state)).same is False
     fewer = replace(recording, counts={**recording.counts, "timing": recording.counts["timing"] - 2})
     assert "; the bag lacks 2 messages that its recorder has written" in verify(fewer).words
     cut = {name: getattr(recording, name)[:500] for name in ("tick", "state", "effort", "command", "lyapunov")}
@@ -171,7 +166,6 @@ def test_a_record_longer_than_any_of_a_bag_is_refused_and_left_out_of_a_new_bag(
 def test_what_does_not_follow_without_the_messages_that_a_bag_lacks_is_not_told(
     two_runs: tuple[Path, Path], tmp_path: Path, command: Any, without: dict[str, int], tick: int, lost: dict[str, int]
 ) -> None:
-    """No contacts, a balance that closes at every tick, and -11 messages lost were told."""
     rewritten(two_runs[0] / "bag" / "bag.mcap", tmp_path / "new.mcap", without=without)
     whole, found = (json.loads(command("inspect", str(path), "--json").stdout)
                     for path in (two_runs[0] / "bag", tmp_path / "new.mcap"))
@@ -241,14 +235,10 @@ def test_a_scene_with_effects_is_the_same_everywhere(tmp_path: Path, name: str) 
     settings = ["time.duration_s=1.0", *more]
     one = name in ("noise", "hammer", "no_contact")
     graph = Graph(scene.load(name, settings), tmp_path / "run", ACCURACY, one_process=one)
-    graph.start()
-    try:
+    with started(graph) as statuses:
         graph.wait([])
-    finally:
-        statuses = graph.stop()
     assert set(statuses.values()) == {0}
-    recording = bag.read(graph.bag)
-    assert verify(recording).holds
+    recording = whole(graph.bag)
     simulated = simulate(recording.scene, sampled=True)
     for ours, own in ((recording.state, simulated.state), (recording.inputs, inputs := simulated.inputs),
                       (recording.command, simulated.command)):
@@ -256,7 +246,6 @@ def test_a_scene_with_effects_is_the_same_everywhere(tmp_path: Path, name: str) 
     if more:  # a delay, a limit, and a pulse that all act
         assert inputs[0].tolist() == [0.0, 0.0, 0.0]
         assert (np.nanmax(np.abs(inputs[:, LEFT])), np.nanmax(inputs[:, OBJECT])) == (30.0, 30.0)
-    assert not any(recording.missing.values())
     assert not recording.lyapunov[:, 5].any()
     assert {topic for topic, _, _ in content(tmp_path / "run")} == {
         "/scene", "/run", "/clock", *(f"/{topic.name}" for topic in recording.scene.topics),
@@ -265,23 +254,17 @@ def test_a_scene_with_effects_is_the_same_everywhere(tmp_path: Path, name: str) 
     assert set(statuses) == ({"graph"} if one else {"plant", "monitor", *recording.scene.controllers})
 
 
-def test_numbers_set_on_a_running_controller_are_recorded_and_replayed(
-    tmp_path: Path, node: tuple[Any, SingleThreadedExecutor]
-) -> None:
+def test_numbers_set_on_a_running_controller_are_recorded_and_replayed(tmp_path: Path, node: Any) -> None:
     peer, executor = node
     clients = {name: AsyncParameterClient(peer, name) for name in ("left_controller", "plant")}
     graph = Graph(scene.load("case_01", ["time.duration_s=100"]), tmp_path / "run", ACCURACY)  # stopped when asked
 
     def answer(name: str, number: Parameter) -> Any:
         future = clients[name].set_parameters([number])
-        deadline = time.monotonic() + DEADLINE
-        while not future.done():
-            assert time.monotonic() < deadline, f"{name} does not answer"
-            executor.spin_once(timeout_sec=0.01)
+        wait_for(lambda: executor.spin_once(timeout_sec=0.01) or future.done(), f"an answer of {name}")
         return future.result().results[0]
 
-    graph.start()
-    try:
+    with started(graph) as statuses:
         wait_for(clients["left_controller"].services_are_ready, "the controller")
         wait_for(clients["plant"].services_are_ready, "the plant")
         wait_for(lambda: graph.bag.exists(), "the bag")  # the controller has the scene when the monitor has it
@@ -296,8 +279,6 @@ def test_numbers_set_on_a_running_controller_are_recorded_and_replayed(
         states: list[JointState] = []  # the nodes answer before the first tick, too
         peer.create_subscription(JointState, JOINT_STATES.name, states.append, messages.qos(JOINT_STATES))
         wait_for(lambda: executor.spin_once(timeout_sec=0.05) or len(states) > 100, "the ticks with the new gain")
-    finally:
-        statuses = graph.stop()
     assert set(statuses.values()) == {0}
     recording = bag.read(graph.bag)
     assert list(recording.changes.values()) == [{gain: 9.0}]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import re
@@ -17,10 +16,10 @@ from typing import Any
 import numpy as np
 import pytest
 import rclpy
-from graphs import call
+from graphs import status, whole
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from processes import DEADLINE, GRASP, children, end_nodes, growing, node_command, ran, wait_for
+from processes import GRASP, children, end_nodes, ended, node_command, ran, wait_for, write_law
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
@@ -55,13 +54,11 @@ def test_a_controller_at_its_own_rate_is_held_recorded_and_verified(
     words = ("--without", "left_controller", "--free-running", "0.5")
     run = grasp_run("case_01", "--set", "time.duration_s=1.5", *words)
     launch(sys.executable, "-c", source, stderr=subprocess.DEVNULL)
-    out, err = run.communicate(timeout=DEADLINE)
-    assert run.returncode == 0, out + err
+    ended(run)
     assert time.monotonic() - begin > 3.0  # half as fast as the clock
-    recording = bag.read(tmp_path / "run" / "bag")
+    recording = whole(tmp_path / "run" / "bag")
     assert recording.running.words == "free-running, 0.5 s per second; on timeout: zero after 0.1 s"
     assert recording.tick.tolist() == list(range(1501))
-    assert verify(recording).holds
     assert 3 < len(np.unique(recording.effort[:, 0])) < 200  # held over many periods
     assert np.isnan(recording.lyapunov[:, 0]).all()
     assert recording.command[:-1].tobytes() == recording.effort[1:].tobytes()  # what acted: it answers no tick
@@ -77,31 +74,27 @@ def test_a_controller_at_its_own_rate_is_held_recorded_and_verified(
 def test_a_silent_controller_has_the_declared_reaction(launch: Any, reaction: str, status: int) -> None:
     numbers = {**FREE, "real_time_factor": 50, "left_timeout_s": 0.25, "left_on_timeout": reaction}
     plant = launch(*node_command("plant", **numbers, progress="true"), stderr=subprocess.PIPE)
-    errors = plant.communicate(timeout=DEADLINE)[1]
+    _, errors = ended(plant, status)
     assert "%|" not in errors  # no bar of progress where no terminal is
-    assert plant.returncode == status
     assert f"left: no command newer than 0.25 s at tick 250; reaction: {reaction}" in errors
     assert ("finished 20000 ticks" in errors) is (reaction == "zero")
 
 
-def test_who_has_sent_a_first_command_is_not_waited_for(context: rclpy.Context) -> None:
-    """A quick controller was named in place of the slow one beside it."""
-    given = {"scene": "case_01", "free_running": True, "wait_for_controllers": True, "wait_for_monitor": False}
-    plant = Plant(context=context, parameter_overrides=[Parameter(name, value=own) for name, own in given.items()])
+def test_who_has_sent_a_first_command_is_not_waited_for(make: Any) -> None:
+    plant = make(Plant, scene="case_01", free_running=True, wait_for_controllers=True, wait_for_monitor=False)
     left, right = plant.scene.controllers.values()
     plant.loop._on_command("left", left, force_message(0, 1.0))
     assert [(need.topic, need.due) for need in plant.needs()] == [(left, math.inf), (right, plant.published_at)]
-    end_nodes(plant)
 
 
 @pytest.mark.parametrize("monitored", [True, False])
-def test_a_free_run_begins_when_its_monitor_has_heard_all_controllers(context: rclpy.Context, monitored: bool) -> None:
-    """DDS connected one of a user's with the monitor seconds after the plant: the bag lacked its commands."""
-    given = {"scene": "case_01", "free_running": True, "wait_for_controllers": True, "wait_for_monitor": monitored}
-    plant = Plant(context=context, parameter_overrides=[Parameter(name, value=own) for name, own in given.items()])
-    peer, sides = PeerNode("left_controller", context=context), plant.scene.controllers
+def test_a_free_run_begins_when_its_monitor_has_heard_all_controllers(
+    make: Any, executor: SingleThreadedExecutor, monitored: bool
+) -> None:
+    """DDS may connect one with the monitor seconds after the plant: the bag would lack its commands."""
+    plant = make(Plant, scene="case_01", free_running=True, wait_for_controllers=True, wait_for_monitor=monitored)
+    peer, sides = make(PeerNode, "left_controller"), plant.scene.controllers
     plant.published_at = 1.0  # when its first state was published, in s
-    executor = SingleThreadedExecutor(context=context)
     for node in (plant, peer):
         executor.add_node(node)
     for heard in ([], [*sides.values()]):
@@ -115,13 +108,10 @@ def test_a_free_run_begins_when_its_monitor_has_heard_all_controllers(context: r
         waits = monitored and not heard
         assert plant.loop.missing() == ([topic.name for topic in sides.values()] if waits else [])
         assert any(need.due == plant.published_at for need in plant.needs()) is waits  # not for ever
-    executor.shutdown()
-    end_nodes(plant, peer)
 
 
-def test_a_reset_waits_for_the_monitor_and_the_wait_is_no_period(context: rclpy.Context) -> None:
-    given = {"scene": "arm_alone", "free_running": True, "wait_for_controllers": False, "wait_for_monitor": True}
-    plant = Plant(context=context, parameter_overrides=[Parameter(name, value=own) for name, own in given.items()])
+def test_a_reset_waits_for_the_monitor_and_the_wait_is_no_period(make: Any) -> None:
+    plant = make(Plant, scene="arm_alone", free_running=True, wait_for_controllers=False, wait_for_monitor=True)
     plant.begun, loop = True, plant.loop
 
     def go_on(tick: int) -> None:
@@ -137,20 +127,19 @@ def test_a_reset_waits_for_the_monitor_and_the_wait_is_no_period(context: rclpy.
     assert (plant.tick, plant.resets) == (0, 1)
     go_on(5)
     assert max(loop._timing._intervals) < 0.2
-    end_nodes(plant)
 
 
-def test_v_is_known_from_the_first_state_of_a_free_run_on(grasp_run: Any, tmp_path: Path) -> None:
-    """The clock starts with the first commands, whose law no bag knew at the first state: none had a V of the feedback.
-
-    After a reset the laws are announced anew, and nothing acts before.
-    """
+def test_v_is_known_from_the_first_state_of_a_free_run_with_priority_on(grasp_run: Any, tmp_path: Path) -> None:
+    """After a reset the laws are announced anew, and nothing acts before. Where there is no priority it says why."""
     run = grasp_run("case_01", "--set", "time.duration_s=200", "--free-running", "1", "--no-check", "--no-figure")
     wait_for(lambda: not ran(*GRASP, "ctl", "reset").returncode, "a reset")
+    nodes = children(tmp_path)
+    schedulers = {name: os.sched_getscheduler(process) for name, process in nodes.items()}
     assert not ran(*GRASP, "ctl", "pause").returncode
     run.send_signal(signal.SIGINT)
-    out, err = run.communicate(timeout=DEADLINE)
-    assert run.returncode == 0, err
+    out, err = ended(run)
+    given = "real-time priority is not available here" not in err
+    assert schedulers == {name: os.SCHED_RR if given and name != "monitor" else os.SCHED_OTHER for name in nodes}
     assert "refused" not in err  # what was on its way at the reset
     recording = bag.read(tmp_path / "run" / "bag")
     assert len(recording.starts) == 2
@@ -161,98 +150,67 @@ def test_v_is_known_from_the_first_state_of_a_free_run_on(grasp_run: Any, tmp_pa
 
 
 def test_periods_of_more_than_half_a_second_are_not_late(launch: Any) -> None:
-    """Half a second of them was given up at every look at the clock, without end."""
     numbers = {**FREE, "real_time_factor": 0.0016, "time.duration_s": 0.004}
     plant = launch(*node_command("plant", **numbers), stderr=subprocess.PIPE)
     begin = time.monotonic()
-    errors = plant.communicate(timeout=DEADLINE)[1]
-    assert (plant.returncode, "finished 4 ticks" in errors) == (0, True), errors
+    assert "finished 4 ticks" in ended(plant)[1]
     assert time.monotonic() - begin > 2.5
 
 
 THREE_SECONDS = ("arm_alone", "--set", "time.duration_s=3", "--no-figure")
-SLOW = """
-import time
-def law(tick, t, x, v):
-    time.sleep(0.005 if tick else 1.0)
-    return -5.0 * x - 0.5 * v
-"""
 
 
-def test_a_slow_controller_answers_the_newest_state_and_its_age_is_shown(
+def test_a_slow_controller_answers_the_newest_state_and_what_was_late_is_shown(
     grasp_run: Any, tmp_path: Path, command: Any
 ) -> None:
     """5 ms for a period of 0.5 ms of wall time: to answer each state would take five times as long as the run.
 
-    The first answer takes a second, which does not count: the clock starts with it.
+    The first answer takes a second, which does not count: the clock starts with it. Another one times out.
     """
-    (tmp_path / "slow.py").write_text(SLOW)
+    late = ["if tick > 1500 and not seen:", "    seen.append(tick)", "    time.sleep(0.25)"]
+    write_law(tmp_path, "time.sleep(0.005 if tick else 1.0)", *late)
     limits = ("--max-age", "1", "--min-factor", "2.5")
-    run = grasp_run(*THREE_SECONDS, "--free-running", "2", "--controller", "left=slow:law", *limits)
-    out, err = run.communicate(timeout=DEADLINE)
-    recording = bag.read(tmp_path / "run" / "bag")
+    run = grasp_run(*THREE_SECONDS, "--free-running", "2", "--controller", "left=mine:law", *limits)
+    out, err = ended(run, 1)
+    assert "no command newer than 0.1 s" in err
+    recording = whole(tmp_path / "run" / "bag")
     usual, most = recording.ages["left"]
-    assert verify(recording).holds
     silent = replace(recording, held={"left": recording.held["left"][:5]})
     assert "the bag lacks commands of left that acted, the first at tick" in verify(silent).words
     assert 9.0 <= usual <= most
     assert usual < 1000.0
+    assert 100 < recording.timed_out["left"] < 1500
     assert recording.counts["left/effort_command"] < 1500
     assert 0.0 < recording.reached <= 2.05
-    assert run.returncode == 1
     assert not re.search("Hz: [^;]*(/diagnostics|timing)", out)  # they go by wall time
     assert f"grasp: --max-age 1: the oldest command was {most:g} periods old" in err
     assert f"grasp: --min-factor 2.5: {recording.reached:.3g} s per second was reached" in err
     words = f"{recording.reached:.3g} s per second, {recording.overruns} overruns, "
+    timed_out = f"left for {recording.timed_out['left']} periods, in which its last command was older than"
     for text in (out, command("inspect", "run/bag").stdout):
         assert words in text
         assert f"left at most {most:.0f} periods, 99 % at most {usual:.0f}" in text
+        assert re.search(rf"timed out +{timed_out}", text)
     assert re.search(r"wall time +\d+\.\d s: (compilation .*, )?start \d.*, run .*, stop .*, reading .*, check", out)
     assert not (tmp_path / "run" / "figure.png").exists()
     assert command("inspect", "run/bag", "--max-age", "1").returncode == 1
     assert command("inspect", "run/bag", "--max-age", str(most), "--min-factor", "0.01").returncode == 0
 
 
-HANGS = """
-import time
-def law(tick, t, x, v):
-    if tick > 500 and not hung:
-        hung.append(tick)
-        time.sleep(0.5)
-    return -5.0 * x - 0.5 * v
-hung = []
-"""
-
-
-def test_a_bag_tells_for_how_long_a_command_was_missing(grasp_run: Any, tmp_path: Path, command: Any) -> None:
-    (tmp_path / "hangs.py").write_text(HANGS)
-    run = grasp_run(*THREE_SECONDS, "--free-running", "1", "--controller", "left=hangs:law")
-    out, err = run.communicate(timeout=DEADLINE)
-    assert "no command newer than 0.1 s" in err
-    late = bag.read(tmp_path / "run" / "bag").timed_out["left"]
-    assert 300 < late < 2500
-    for text in (out, command("inspect", "run/bag").stdout):
-        assert re.search(rf"timed out +left for {late} periods, in which its last command was older than", text)
-
-
 def test_a_run_that_is_interrupted_tells_the_ages_of_its_end(grasp_run: Any, tmp_path: Path, command: Any) -> None:
-    """They were those of up to a second before, and a limit that was broken ended with status 0."""
-    (tmp_path / "hangs.py").write_text(HANGS.replace("0.5)", "5)"))
-    run = grasp_run(*THREE_SECONDS, "--free-running", "1", "--controller", "left=hangs:law", "--max-age", "90")
+    write_law(tmp_path, "time.sleep(5.0 if tick > 500 else 0.0)")
+    run = grasp_run(*THREE_SECONDS, "--free-running", "1", "--controller", "left=mine:law", "--max-age", "90")
     assert any("no command newer than 0.1 s" in line for line in run.stderr)
     run.send_signal(signal.SIGINT)
-    _, err = run.communicate(timeout=DEADLINE)
+    _, err = ended(run, 1)
     recording = bag.read(tmp_path / "run" / "bag")
     assert recording.ages["left"][1] >= 100.0
     assert recording.timed_out["left"] > 0
     assert f"--max-age 90: the oldest command was {recording.ages['left'][1]:g} periods old" in err
-    assert run.returncode == 1
 
 
 @pytest.mark.thorough
-def test_a_plant_that_is_faster_than_its_monitor_waits_for_it(
-    launch: Any, node: tuple[Any, SingleThreadedExecutor]
-) -> None:
+def test_a_plant_that_is_faster_than_its_monitor_waits_for_it(launch: Any, node: Any) -> None:
     """A monitor that says when it has recorded: what is more than WINDOW ahead of it could be lost."""
     peer, executor = node
     period_ns, ticks = scene.load("arm_alone").period_ns, []
@@ -267,32 +225,20 @@ def test_a_plant_that_is_faster_than_its_monitor_waits_for_it(
     for last, next_one in ((WINDOW, 400), (400 + WINDOW + 1, 900)):
         wait_for(lambda last=last: executor.spin_once(timeout_sec=0.05) or ticks[-1:] == [last], f"tick {last}")
         for _ in range(3):
-            assert json.loads(call("status", node).message)["tick"] == last
+            assert status(node)["tick"] == last
         recorded.publish(plain_messages.lyapunov(next_one * period_ns, [0.0] * len(LYAPUNOV_NAMES)))
     assert ticks == list(range(len(ticks)))
 
 
-def test_a_free_run_has_a_priority_or_says_why_not(grasp_run: Any, tmp_path: Path) -> None:
-    run = grasp_run("arm_alone", "--free-running", "--set", "time.duration_s=60")
-    growing(tmp_path / "run" / "bag")
-    nodes = children(tmp_path)
-    found = {name: os.sched_getscheduler(pid) for name, pid in nodes.items()}
-    run.terminate()
-    given = "real-time priority is not available here" not in run.communicate(timeout=DEADLINE)[1]
-    assert found == {name: os.SCHED_RR if given and name != "monitor" else os.SCHED_OTHER for name in nodes}
-
-
 def test_a_monitor_that_waits_for_a_lost_command_is_not_blocked(
-    context: rclpy.Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    context: rclpy.Context, make: Any, executor: SingleThreadedExecutor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its own watchdog ended it before the bag was closed."""
+    """Its own watchdog would end it before the bag is closed."""
     ended = list[int]()
-    watched, given = Parameter("wait_for_monitor", value=True), {"scene": "arm_alone", "free_running": True}
-    plant = Plant(context=context, parameter_overrides=[watched, *(Parameter(k, value=v) for k, v in given.items())])
-    controller = Controller("left_controller", context=context, parameter_overrides=[watched])
-    monitor = Monitor(context=context, parameter_overrides=[
-        Parameter("bag", value=str(tmp_path / "bag")), Parameter("on_silence", value="end")])
-    executor = SingleThreadedExecutor(context=context)
+    plant = make(Plant, scene="arm_alone", free_running=True, wait_for_monitor=True)
+    controller = make(Controller, "left_controller", wait_for_monitor=True)
+    given = [Parameter("bag", value=str(tmp_path / "bag")), Parameter("on_silence", value="end")]
+    monitor = Monitor(context=context, parameter_overrides=given)
     for node in (plant, controller, monitor):
         executor.add_node(node)
     wait_for(lambda: executor.spin_once(timeout_sec=0.1) or any(monitor._acted), "a command that acted")
@@ -304,4 +250,3 @@ def test_a_monitor_that_waits_for_a_lost_command_is_not_blocked(
     end_nodes(monitor)
     assert not ended
     assert len(bag.read(tmp_path / "bag").tick)
-    end_nodes(plant, controller)

@@ -7,7 +7,6 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -15,25 +14,24 @@ from typing import Any
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from processes import DEADLINE, START, Terminals, children, end_nodes, growing, more_ticks, node_command, wait_for
+from graphs import whole
+from processes import DEADLINE, Terminals, children, ended, growing, more_ticks, node_command, wait_for, write_law
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.parameter import Parameter
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from grasp_ros import scene
 from grasp_ros.graph import bag
-from grasp_ros.graph.bag.verify import verify
 from grasp_ros.graph.health.heartbeat import Heartbeat, Heartbeats
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode
 from grasp_ros.scene.topics import RUN as RUNNING
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.slow  # real processes
+
 
 @pytest.fixture
-def levels(node: tuple[Any, SingleThreadedExecutor]) -> Any:
+def levels(node: Any) -> Any:
     """Levels of /diagnostics by node, as they are now."""
     peer, executor = node
     found: dict[str, bytes] = {}
@@ -53,8 +51,7 @@ def levels(node: tuple[Any, SingleThreadedExecutor]) -> Any:
 @pytest.mark.thorough
 def test_who_waits_says_for_whom_and_goes_on_when_it_is_back(launch: Any, tmp_path: Path, levels: Any) -> None:
     """Each of four nodes frozen and thawed in turn: no tick is lost, and the bag is right."""
-    (tmp_path / "scene.yaml").write_text(scene.load("case_01", ["time.duration_s=3600"]).to_yaml())
-    graph = Terminals(launch, tmp_path, str(tmp_path / "scene.yaml"))
+    graph = Terminals(launch, tmp_path, {"time.duration_s": 3600.0})
     needs = {  # who misses a message of the first
         "left_controller": ("plant", r"effort_command: no (heartbeat|answer).* of /left_controller for 1\.\d s"),
         "monitor": ("plant", r"lyapunov: no (heartbeat|answer).* of /monitor for 1\.\d s"),
@@ -70,15 +67,13 @@ def test_who_waits_says_for_whom_and_goes_on_when_it_is_back(launch: Any, tmp_pa
         assert "this node was suspended for" in graph.said(name)
     graph.processes["right_controller"].kill()
     graph.wait_for("plant", r"right/effort_command: no (heartbeat|answer).* of /right_controller for 1\.\d s")
-    launch(*START, "right_controller", "--ros-args", "-p", "wait_for_monitor:=true", stderr=subprocess.DEVNULL)
+    launch(*node_command("right_controller", wait_for_monitor="true"), stderr=subprocess.DEVNULL)
     wait_for(lambda: "right/effort_command: is back after" in graph.said("plant"), "the one in its place")
     more_ticks(graph.file)
     graph.processes["plant"].send_signal(signal.SIGINT)
     assert graph.processes["monitor"].wait(DEADLINE) == 1
     assert re.search(r"joint_states: /plant has ended; the bag has \d+ ticks", graph.said("monitor"))
-    recording = bag.read(tmp_path / "bag")
-    assert not any(recording.missing.values())
-    assert verify(recording).holds
+    whole(tmp_path / "bag")
     assert "Traceback" not in graph.said()
 
 
@@ -101,56 +96,15 @@ def test_a_run_ends_with_a_sentence(
     run = grasp_run("case_01", *(["--one-process"] if name == "graph" else []))
     file = growing(tmp_path / "run" / "bag", 50_000)
     os.kill(children(tmp_path)[name], number)
-    _, err = run.communicate(timeout=DEADLINE)
-    assert run.returncode == 1
+    _, err = ended(run, 1)
     assert re.fullmatch(rf"grasp: .*({words}).*; run/bag has what was recorded", err.splitlines()[-1]), err
-    assert "Traceback" not in err
-    recording = bag.read(file.parent)
-    assert verify(recording).holds
-    assert not any(recording.missing.values())
+    whole(file.parent)
     assert (number == signal.SIGKILL) is not (file.parent / "metadata.yaml").exists()
 
 
-FORGETFUL = """
-import rclpy
-from geometry_msgs.msg import WrenchStamped
-from sensor_msgs.msg import JointState
-rclpy.init()
-node = rclpy.create_node("forgetful")
-commands = node.create_publisher(WrenchStamped, "left/effort_command", 1000)
-lost = [0, 50_000_000, 200_000_000]
-def answer(state):
-    if state.header.stamp.nanosec in lost:  # as if it had not come
-        lost.remove(state.header.stamp.nanosec)
-        return
-    i = state.name.index("left")
-    command = WrenchStamped(header=state.header)
-    command.wrench.force.x = -5.0 * state.position[i] - 0.5 * state.velocity[i]
-    commands.publish(command)
-while commands.get_subscription_count() < 2:
-    rclpy.spin_once(node, timeout_sec=0.01)
-node.create_subscription(JointState, "joint_states", answer, 1000)
-rclpy.spin(node)
-"""
-
-
-def test_a_state_that_is_lost_comes_again_and_is_in_the_bag_once(launch: Any, grasp_run: Any, tmp_path: Path) -> None:
-    """With a controller that gives no sign of life."""
-    run = grasp_run("case_01", "--set", "time.duration_s=0.3", "--no-figure", "--without", "left_controller")
-    launch(sys.executable, "-c", FORGETFUL, stderr=subprocess.DEVNULL)
-    out, err = run.communicate(timeout=DEADLINE)
-    assert run.returncode == 0, err
-    assert "301 states follow from the recorded inputs, bit for bit" in out
-    recording = bag.read(tmp_path / "run" / "bag")
-    assert recording.tick.tolist() == list(range(301))
-    assert not any(recording.missing.values())
-    assert int(recording.lost["repeated messages"]) + int(recording.lost["repeated states"]) > 0
-
-
-def test_what_the_executor_was_not_told_of_is_found(node: tuple[Any, SingleThreadedExecutor]) -> None:
+def test_what_the_executor_was_not_told_of_is_found(make: Any, node: Any) -> None:
     """A message, and a call of a service, that lie there without a wake-up: nobody spins this node."""
-    peer, executor = node
-    waiting = GraspNode("waiting", context=peer.context)
+    (peer, executor), waiting = node, make(GraspNode, "waiting")
     heard: list[str] = []
     waiting.subscribe(RUNNING, lambda message: heard.append(message.data))
     waiting.create_service(Trigger, "~/status", lambda _, answer: answer)
@@ -168,43 +122,32 @@ def test_what_the_executor_was_not_told_of_is_found(node: tuple[Any, SingleThrea
 
     wait_for(found, "both")
     assert heard == ["text"]
-    end_nodes(waiting)
-
-
-BUSY = """
-import time
-def law(tick, t, x, v):
-    time.sleep(1.6 if tick == 50 else 0.0)
-    return -5.0 * x - 0.5 * v
-"""
 
 
 def test_who_is_busy_was_not_stopped(launch: Any, tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text(BUSY)
-    (tmp_path / "scene.yaml").write_text(scene.load("arm_alone", ["time.duration_s=0.1"]).to_yaml())
-    plant = launch(*START, "plant", "--ros-args", "-p", "scene:=scene.yaml", cwd=tmp_path, stderr=subprocess.DEVNULL)
+    write_law(tmp_path, "time.sleep(1.6 if tick == 50 else 0.0)")
+    plant = launch(*node_command("plant", scene="arm_alone", **{"time.duration_s": 0.1}), stderr=subprocess.DEVNULL)
     controller = launch(*node_command("left_controller", law="mine:law"), cwd=tmp_path, stderr=subprocess.PIPE)
     assert plant.wait(DEADLINE) == 0
     controller.terminate()
     assert "this node was suspended" not in controller.communicate(timeout=DEADLINE)[1]
 
 
-def test_who_prepares_is_waited_for_and_who_does_not_come_is_not(context: rclpy.Context) -> None:
+def test_who_prepares_is_waited_for_and_who_does_not_come_is_not(
+    context: rclpy.Context, make: Any, executor: SingleThreadedExecutor
+) -> None:
     """A node that nobody spins is as one that compiles: its signs come from a thread of their own."""
-    short = [Parameter("start_timeout_s", value=1.6), Parameter("on_silence", value="end")]
     other = Controller("right_controller", context=context)
-    controller = Controller("left_controller", context=context, parameter_overrides=short)
-    executor = SingleThreadedExecutor(context=context)
+    controller = make(Controller, "left_controller", start_timeout_s=1.6, on_silence="end")
     executor.add_node(controller)
     end = time.monotonic() + 4.0
     while time.monotonic() < end:
         executor.spin_once(timeout_sec=0.1)
     assert not controller.finished
-    end_nodes(other)
+    other.close()
+    other.destroy_node()
     wait_for(lambda: executor.spin_once(timeout_sec=0.1) or controller.finished, "its end")
     assert "timeout of 1.6 s" in controller.words
-    executor.shutdown()
-    end_nodes(controller)
 
 
 AWAY = """
@@ -228,8 +171,7 @@ def test_a_law_that_goes_away_is_followed_and_one_that_stands_in_one_process_has
 ) -> None:
     (tmp_path / "mine.py").write_text(AWAY)
     run = grasp_run("case_01", "--one-process", "--controller", "left=mine:law", *how)
-    _, err = run.communicate(timeout=DEADLINE)  # the time for the first answer is longer than this
-    assert run.returncode == 1
+    _, err = ended(run, 1)  # in less time than a first answer may take
     words = r"^grasp: left_controller: blocked for \d+\.\d s: in .*mine.py, line 11; run/bag has what"
     assert re.search(words, err, re.M), err
     assert bag.read(tmp_path / "run" / "bag").tick[-1] > 100
@@ -245,40 +187,26 @@ def test_a_law_whose_import_does_not_return_is_named(launch: Any, tmp_path: Path
     assert re.search(r"^\[FATAL\] \[left_controller\]: blocked for \d\.\d s: in .*mine.py, line 2$", err, re.M), err
 
 
-STANDING = """
-import time
-from pathlib import Path
-def law(tick, t, x, v):
-    if tick == 50:
-        Path("standing").touch()
-        time.sleep(3600.0)  # as in a call of DDS that waits for a lock which a stopped process holds
-    return -5.0 * x - 0.5 * v
-"""
-
-
 def test_who_stands_because_another_was_stopped_says_so_and_ends(launch: Any, tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text(STANDING)
-    plant = launch(*START, "plant", "--ros-args", "-p", "scene:=arm_alone", cwd=tmp_path, stderr=subprocess.DEVNULL)
+    """As in a call of DDS that waits for a lock which a stopped process holds."""
+    write_law(tmp_path, "if tick == 50:", "    os.mkdir('standing')", "    time.sleep(3600.0)")
+    plant = launch(*node_command("plant", scene="arm_alone"), stderr=subprocess.DEVNULL)
     words = node_command("left_controller", law="mine:law", on_silence="end")
     controller = launch(*words, cwd=tmp_path, stderr=subprocess.PIPE)
     wait_for((tmp_path / "standing").exists, "a law that stands")
     plant.send_signal(signal.SIGSTOP)
-    _, err = controller.communicate(timeout=DEADLINE)
-    assert controller.returncode == 1
+    _, err = ended(controller, 1)
     assert re.search(r"\[FATAL\] \[left_controller\]: blocked for \d+\.\d s: /plant suspended\n", err), err
 
 
-def test_one_that_has_just_come_is_not_silent_as_the_one_before_it(node: tuple[Any, SingleThreadedExecutor]) -> None:
-    peer, _ = node
-    waiting = GraspNode("waiting", context=peer.context)
-    heartbeats = Heartbeats(waiting, lambda: None, lambda: None)
+def test_one_that_has_just_come_is_not_silent_as_the_one_before_it(make: Any) -> None:
+    heartbeats = Heartbeats(make(GraspNode, "waiting"), lambda: None, lambda: None)
     sign = {"node": "/plant", "identity": "first", "texts": [], "ended": "", "process": "", "ready": True}
     heartbeats._on_beat(String(data=json.dumps(sign)))
     assert heartbeats.quiet(["/plant"], time.monotonic()) == ["/plant"]
     heartbeats._on_beat(String(data=json.dumps({**sign, "ended": "ended"})))
     assert heartbeats.quiet(["/plant"], time.monotonic()) == []  # whom DDS lists by now is another one
     heartbeats.end("")
-    end_nodes(waiting)
 
 
 @pytest.mark.parametrize("process", ["", " ", "\t1", "1", "1 2 3", "x y", "../self 1"])
@@ -290,9 +218,8 @@ def test_a_process_that_this_machine_does_not_have_is_not_running(process: str) 
 @pytest.mark.thorough
 def test_a_process_whose_own_end_hangs_is_ended(grasp_run: Any, tmp_path: Path) -> None:
     """DDS waits for ever for what a law has closed."""
-    (tmp_path / "mine.py").write_text("import os\ndef law(tick, t, x, v):\n    os.closerange(3, 200)\n    return 0.0\n")
+    write_law(tmp_path, "os.closerange(3, 200)")
     run = grasp_run("case_01", "--one-process", "--controller", "left=mine:law")
-    _, err = run.communicate(timeout=DEADLINE)
-    assert run.returncode == 1
+    _, err = ended(run, 1)
     assert "Bad file descriptor" in err
     wait_for(lambda: not children(tmp_path), "the end of all processes")

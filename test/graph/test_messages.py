@@ -64,10 +64,14 @@ def test_states_are_those_of_the_message(bodies: list[int]) -> None:
     assert found == plain_messages.joint_state(TIME_NS, bodies, STATE, INPUTS)
 
 
-def test_forces_and_clocks_have_their_time_and_number() -> None:
+def test_forces_and_clocks_have_their_time_and_number_whatever_the_frame() -> None:
     cdr = template_of(LEFT_COMMAND).fill(TIME_NS, [-0.1])
     assert (raw_stamp_ns(cdr), raw_force(cdr)) == (TIME_NS, -0.1)
     assert raw_stamp_ns(template_of(CLOCK).fill(TIME_NS, ())) == TIME_NS
+    for length in range(20):
+        message = plain_messages.wrench(7, -1.5)
+        message.header.frame_id = "x" * length
+        assert raw_force(serialize_message(message)) == -1.5
 
 
 def test_a_wrong_number_of_numbers_is_refused() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,29 +24,58 @@ from grasp_ros.graph.running import Running
 from grasp_ros.graph.serialization import list_message
 from grasp_ros.physics.layout import OBJECT
 from grasp_ros.physics.system import COLUMN, NAMES
-from grasp_ros.scene.topics import (
-    DIAGNOSTICS,
-    JOINT_STATES,
-    LEFT_COMMAND,
-    LEFT_CONTACT,
-    LYAPUNOV,
-    LYAPUNOV_NAMES,
-    SCENE,
-    TIMING,
-    Topic,
-    timing_names,
-)
-from grasp_ros.simulation import simulate
+from grasp_ros.scene import topics
+from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, LEFT_CONTACT, LYAPUNOV, LYAPUNOV_NAMES, SCENE, Topic
+from grasp_ros.simulation import Trajectory, simulate
 from lab.drills import recorder as study
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
+Ticks = list[study.Tick]
+
+
+@pytest.fixture(scope="module")
+def run() -> Trajectory:
+    return simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
+
+
+@pytest.fixture
+def ticks(run: Trajectory) -> list[study.Tick]:
+    """What a recorder has of the run, to be changed."""
+    return list(study.ticks_of(run))
+
+
+def put(tick: study.Tick, topic: Topic, cdr: bytes) -> None:
+    """Another message in the place of one of a tick."""
+    tick[1][[own for own, _ in tick[1]].index(topic)] = topic, cdr
+
+
+def changed(topic: Topic, cdr: bytes, path: str, value: Any) -> bytes:
+    """A message with another value somewhere: "position.1" or "header.stamp.nanosec", say."""
+    content: Any = STORE.deserialize_cdr(cdr, topic.type)
+    *parents, last = path.split(".")
+    place = content
+    for name in parents[: -1 if last.isdecimal() else None]:
+        place = getattr(place, name)
+    if last.isdecimal():
+        last, number = parents[-1], int(last)
+        values = getattr(place, last).copy()
+        values[number], value = value, values
+    setattr(place, last, value)
+    return bytes(STORE.serialize_cdr(content, topic.type))
+
+
+def change(tick: study.Tick, topic: Topic, path: str, value: Any) -> None:
+    """Change a message of a tick."""
+    put(tick, topic, changed(topic, dict(tick[1])[topic], path, value))
 
 
 def again(topic: Topic, cdr: bytes, little: bool, frame: str) -> bytes:
     """A message as another program may write it."""
     content: Any = STORE.deserialize_cdr(cdr, topic.type)
     content.header.frame_id = frame
-    if topic == JOINT_STATES:
+    if topic in topics.COMMANDS.values():
+        content.wrench.force.y = 3.0  # of which a reader takes the force along the line alone
+    if topic.type == topics.NAMED_LIST:
         for name in ("name", "position", "velocity", "effort"):
             setattr(content, name, getattr(content, name)[::-1].copy())
     return bytes(STORE.serialize_cdr(content, topic.type, little_endian=little))
@@ -53,7 +83,7 @@ def again(topic: Topic, cdr: bytes, little: bool, frame: str) -> bytes:
 
 @pytest.mark.parametrize("little", [True, False])
 def test_messages_of_another_make_have_the_same_numbers(tmp_path: Path, little: bool) -> None:
-    """In another order of bytes or of bodies, in other frames; some of them among those of the recorder."""
+    """In another order of bytes or of names, in other frames; some of them among those of the recorder."""
     run = simulate(scenes.load("everything", ["time.duration_s=0.05"]), sampled=True)
     study.write(tmp_path / "bag", run)
     ticks = list(study.ticks_of(run))
@@ -68,30 +98,26 @@ def test_messages_of_another_make_have_the_same_numbers(tmp_path: Path, little: 
 
 
 @pytest.mark.parametrize("topic", [JOINT_STATES, LEFT_COMMAND, LYAPUNOV])
-def test_what_is_no_message_is_refused_wherever_it_stands(tmp_path: Path, topic: Topic) -> None:
-    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
-    for number in range(5):
-        ticks = list(study.ticks_of(run))
-        time_ns, messages = ticks[5]
-        cdr = dict(messages)[topic]
-        wrong = [cdr[:-1], cdr + bytes(8), b"", b"\x07" + cdr[1:], cdr[:12] + b"\xff" + cdr[13:]][number]
-        ticks[5] = time_ns, [*{**dict(messages), topic: wrong}.items()]
+def test_what_is_no_message_is_refused_wherever_it_stands(
+    tmp_path: Path, run: Trajectory, ticks: Ticks, topic: Topic
+) -> None:
+    cdr = dict(ticks[5][1])[topic]
+    wrong = cdr[:-1], cdr + bytes(8), b"", b"\x07" + cdr[1:], cdr[:12] + b"\xff" + cdr[13:]
+    for number, noise in enumerate(wrong):
+        put(ticks[5], topic, noise)
         written(tmp_path / str(number), run.scene, ticks)
         with pytest.raises(bag.BagError, match="; `grasp recover` leaves it out"):
             bag.read(tmp_path / str(number))
 
 
-def test_what_strangers_send_on_timing_is_left_out(tmp_path: Path) -> None:
-    """One of them made a whole bag unreadable, or `grasp inspect` a traceback."""
-    names = timing_names(["left", "right"])
+def test_what_strangers_send_on_timing_is_left_out(tmp_path: Path, run: Trajectory, ticks: Ticks) -> None:
+    names = topics.timing_names(["left", "right"])
     own = np.arange(len(names)) + 0.5
     sent = [list_message(0, *message) for message in (
         (("a", "b"), np.ones(2)), (names, own - 0.25), (names, own), (("a", "b"), np.zeros(0)), (names, own * math.nan),
         (names[:-1], own[:-1]), (("reached", "overruns", "lost_s", "left_age_p99_all"), np.ones(4)),
     )]
-    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
-    ticks = list(study.ticks_of(run))
-    ticks[5][1].extend((TIMING, cdr) for cdr in (*sent, b"", sent[2][:-3]))
+    ticks[5][1].extend((topics.TIMING, cdr) for cdr in (*sent, b"", sent[2][:-3]))
     recording = bag.read(written(tmp_path / "bag", run.scene, ticks, running=Running(real_time_factor=1.0)))
     assert {name: values.tolist() for name, values in recording.timing.items()} == {
         name: [number - 0.25, number] for name, number in zip(names, own, strict=True)}
@@ -124,30 +150,6 @@ def test_a_recording_has_the_numbers_that_another_reader_decodes(tmp_path: Path,
         assert recording.command[:, side].tobytes() == commands.tobytes()
 
 
-def test_a_list_of_another_length_is_refused(tmp_path: Path) -> None:
-    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
-    ticks = list(study.ticks_of(run))
-    ticks[-1][1][-1] = LYAPUNOV, list_message(ticks[-1][0], LYAPUNOV_NAMES[:8], np.zeros(8))
-    written(tmp_path / "bag", run.scene, ticks)
-    with pytest.raises(bag.BagError, match="/lyapunov: 8 numbers; allowed: 9"):
-        bag.read(tmp_path / "bag")
-
-
-def changed(topic: Topic, cdr: bytes, path: str, value: Any) -> bytes:
-    """A message with another value somewhere: "position.1" or "header.stamp.nanosec", say."""
-    content: Any = STORE.deserialize_cdr(cdr, topic.type)
-    *parents, last = path.split(".")
-    place = content
-    for name in parents[: -1 if last.isdecimal() else None]:
-        place = getattr(place, name)
-    if last.isdecimal():
-        last, number = parents[-1], int(last)
-        values = getattr(place, last).copy()
-        values[number], value = value, values
-    setattr(place, last, value)
-    return bytes(STORE.serialize_cdr(content, topic.type))
-
-
 @pytest.mark.parametrize(
     ("topic", "path", "value", "words"),
     [
@@ -162,15 +164,15 @@ def changed(topic: Topic, cdr: bytes, path: str, value: Any) -> bytes:
         (LYAPUNOV, "header.stamp.sec", 1, "tick 5: its stamp is not that of the state"),
         (JOINT_STATES, "name.2", "foot", "left, object, foot; allowed: three numbers of left, object, right"),
         (JOINT_STATES, "effort", np.zeros(2), "left, object, right; allowed: three numbers of left, object, right"),
+        (LYAPUNOV, "position", np.zeros(8), "/lyapunov: 8 numbers; allowed: 9"),
+        (LYAPUNOV, "name.0", "vigour", "/lyapunov: vigour, .*; allowed: V, "),
+        (LEFT_CONTACT, "wrench.force.y", 3.0, r"contact/left: a force or torque beside force\.x; allowed: 0"),
     ],
 )
 def test_a_tick_that_cannot_be_true_is_refused_and_left_out_of_what_is_recovered(
-    tmp_path: Path, topic: Topic, path: str, value: Any, words: str
+    tmp_path: Path, run: Trajectory, ticks: Ticks, topic: Topic, path: str, value: Any, words: str
 ) -> None:
-    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
-    ticks = list(study.ticks_of(run))
-    there = dict(ticks[5][1])
-    ticks[5] = ticks[5][0], [*{**there, topic: changed(topic, there[topic], path, value)}.items()]
+    change(ticks[5], topic, path, value)
     written(tmp_path / "bag", run.scene, ticks)
     with pytest.raises(bag.BagError, match=f"{words}.*; `grasp recover` leaves it out"):
         bag.read(tmp_path / "bag")
@@ -181,13 +183,10 @@ def test_a_tick_that_cannot_be_true_is_refused_and_left_out_of_what_is_recovered
 
 
 @pytest.mark.parametrize(("value", "why"), [(np.nan, "/left/effort_command: a number is not finite"), (1.0, "")])
-def test_a_command_of_a_free_run_that_cannot_be_read_is_left_out(tmp_path: Path, value: float, why: str) -> None:
-    """The recovered bag had it, too, and could not be read."""
-    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
-    ticks = list(study.ticks_of(run))
-    there = dict(ticks[5][1])
-    ticks[5] = ticks[5][0], [*{**there, LEFT_COMMAND: changed(
-        LEFT_COMMAND, there[LEFT_COMMAND], "wrench.force.x", value)}.items()]
+def test_a_command_of_a_free_run_that_cannot_be_read_is_left_out(
+    tmp_path: Path, run: Trajectory, ticks: Ticks, value: float, why: str
+) -> None:
+    change(ticks[5], LEFT_COMMAND, "wrench.force.x", value)
     written(tmp_path / "bag", run.scene, ticks, running=Running(real_time_factor=1.0))
     found = recover(tmp_path / "bag", tmp_path / "new")
     assert [left.startswith(f"parts of 1 ticks, the first 5: {why}") for left in found.left_out] == [True] * bool(why)
@@ -199,9 +198,7 @@ def test_a_command_of_a_free_run_that_cannot_be_read_is_left_out(tmp_path: Path,
 def test_every_number_of_the_monitor_is_verified(tmp_path: Path, name: str, value: float) -> None:
     run = simulate(scenes.load("everything", ["time.duration_s=0.05"]), sampled=True)
     ticks = list(study.ticks_of(run))
-    there = dict(ticks[40][1])
-    cdr = changed(LYAPUNOV, there[LYAPUNOV], f"position.{LYAPUNOV_NAMES.index(name)}", value)
-    ticks[40] = ticks[40][0], [*{**there, LYAPUNOV: cdr}.items()]
+    change(ticks[40], LYAPUNOV, f"position.{LYAPUNOV_NAMES.index(name)}", value)
     written(tmp_path / "bag", run.scene, ticks)
     found = verify(bag.read(tmp_path / "bag"))
     assert found.difference is not None
@@ -211,38 +208,28 @@ def test_every_number_of_the_monitor_is_verified(tmp_path: Path, name: str, valu
 
 
 @pytest.mark.parametrize("name", ["alarm", "work"])
-def test_a_balance_that_nobody_knows_does_not_close(tmp_path: Path, name: str) -> None:
-    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
-    ticks, path = [], f"position.{LYAPUNOV_NAMES.index(name)}"
-    for time_ns, rows in study.ticks_of(run):
-        there = dict(rows)
-        ticks.append((time_ns, [*{**there, LYAPUNOV: changed(LYAPUNOV, there[LYAPUNOV], path, np.nan)}.items()]))
+def test_a_balance_that_nobody_knows_does_not_close(tmp_path: Path, run: Trajectory, ticks: Ticks, name: str) -> None:
+    for tick in ticks:
+        change(tick, LYAPUNOV, f"position.{LYAPUNOV_NAMES.index(name)}", np.nan)
     found = summary(bag.read(written(tmp_path / "bag", run.scene, ticks)))
     assert found["balanced_ticks"] == 0
     assert np.isnan(found["work_J"])
 
 
-def test_a_topic_with_another_scene_than_that_of_the_bag_is_refused(tmp_path: Path) -> None:
-    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
-    for name, changes in (("same", {}), ("other", {"object.mass_kg": 9.0})):
-        ticks, kind = list(study.ticks_of(run)), STORE.types[SCENE.type]
-        content = kind(data=run.scene.changed(changes).to_yaml() if changes else run.scene.to_yaml())
-        ticks[0][1].insert(0, (SCENE, bytes(STORE.serialize_cdr(content, SCENE.type))))
-        written(tmp_path / name, run.scene, ticks)
-    assert verify(bag.read(tmp_path / "same")).holds
-    with pytest.raises(bag.BagError, match="another scene than in the bag's own record"):
-        bag.read(tmp_path / "other")
-
-
-def test_a_bag_with_a_reset_may_be_written_anew(tmp_path: Path) -> None:
-    """From a reset on its times are ahead of the stamps."""
-    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
-    ticks = list(study.ticks_of(run))
+def test_a_bag_with_a_reset_may_be_written_anew(tmp_path: Path, run: Trajectory, ticks: Ticks) -> None:
+    """From a reset on its times are ahead of the stamps. A flipped bit is named by its tick of the bag."""
     again = [(ticks[-1][0] + run.scene.period_ns + time_ns, messages, time_ns) for time_ns, messages in ticks]
     written(tmp_path / "bag", run.scene, [*ticks, *again])
     rewritten(tmp_path / "bag" / "bag.mcap", tmp_path / "new.mcap")
     found = bag.read(tmp_path / "new.mcap")
     assert (found.resets, verify(found).ticks, verify(found).problem) == (1, 22, "")
+    row = int(found.starts[1]) + 2
+    for column, name in enumerate(f"{body} {part}" for body in NAMES.values() for part in ("position", "velocity")):
+        state = found.state.copy()
+        state[row].view(np.int64)[column] ^= 1
+        (x, other), tick = (float(states[row, column]) for states in (found.state, state)), found.tick[row]
+        words = f"joint_states, {name}: recorded {other!r} ({other.hex()}), computed {x!r} ({x.hex()})"
+        assert verify(replace(found, state=state)).words == f"NOT EQUAL, first at tick {tick}, {words}"
 
 
 @pytest.mark.parametrize(("times", "why"), [
@@ -250,20 +237,20 @@ def test_a_bag_with_a_reset_may_be_written_anew(tmp_path: Path) -> None:
     ((0, 2, 1), "; allowed: ticks of the scene in their order"),
     ((0, 1, 0.5), "; allowed: ticks of the scene in their order"),
 ])
-def test_ticks_that_are_none_are_refused(tmp_path: Path, times: tuple[float, ...], why: str) -> None:
-    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
-    _, messages = next(study.ticks_of(run))
-    written(tmp_path / "bag", run.scene, [(round(time * run.scene.period_ns), messages, 0) for time in times])
+def test_ticks_that_are_none_are_refused(
+    tmp_path: Path, run: Trajectory, ticks: Ticks, times: tuple[float, ...], why: str
+) -> None:
+    written(tmp_path / "bag", run.scene, [(round(time * run.scene.period_ns), ticks[0][1], 0) for time in times])
     wrong = round(times[-1] * run.scene.period_ns)
     with pytest.raises(bag.BagError, match=f": {wrong} ns{why}"):
         bag.read(tmp_path / "bag")
 
 
-def test_a_message_that_is_twice_in_a_tick_is_refused_and_of_two_the_last_is_recovered(tmp_path: Path) -> None:
-    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
-    ticks = list(study.ticks_of(run))
-    topic, cdr = next((topic, cdr) for topic, cdr in ticks[5][1] if topic == LEFT_CONTACT)
-    ticks[5][1].insert(0, (topic, changed(topic, cdr, "wrench.force.x", 9.0)))
+def test_a_message_that_is_twice_in_a_tick_is_refused_and_of_two_the_last_is_recovered(
+    tmp_path: Path, run: Trajectory, ticks: Ticks
+) -> None:
+    other = changed(LEFT_CONTACT, dict(ticks[5][1])[LEFT_CONTACT], "wrench.force.x", 9.0)
+    ticks[5][1].insert(0, (LEFT_CONTACT, other))
     written(tmp_path / "bag", run.scene, ticks)
     with pytest.raises(bag.BagError, match=r"contact/left: 5000000 ns: a second message of this tick; allowed: one"):
         bag.read(tmp_path / "bag")
@@ -272,9 +259,9 @@ def test_a_message_that_is_twice_in_a_tick_is_refused_and_of_two_the_last_is_rec
     assert verify(bag.read(tmp_path / "new")).ticks == 11
 
 
-def test_another_scene_is_refused_and_said_to_be_left_out(tmp_path: Path) -> None:
-    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
-    ticks = list(study.ticks_of(run))
+def test_another_scene_is_refused_and_said_to_be_left_out(tmp_path: Path, run: Trajectory, ticks: Ticks) -> None:
+    ticks[0][1].insert(0, (SCENE, text_message(run.scene.to_yaml())))
+    assert verify(bag.read(written(tmp_path / "same", run.scene, ticks))).holds
     ticks[5][1].append((SCENE, text_message(scenes.load("case_02").to_yaml())))
     written(tmp_path / "bag", run.scene, ticks)
     why = "/scene: another scene than in the bag's own record"
@@ -283,10 +270,10 @@ def test_another_scene_is_refused_and_said_to_be_left_out(tmp_path: Path) -> Non
     assert recover(tmp_path / "bag", tmp_path / "new").left_out == [f"parts of 1 ticks, the first 5: {why}"]
 
 
-def test_what_lies_beside_a_tick_that_is_lost_is_said_to_be_left_out(tmp_path: Path) -> None:
-    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
-    ticks = list(study.ticks_of(run))
-    ticks[5] = (ticks[5][0], [(DIAGNOSTICS, bytes(16))])
+def test_what_lies_beside_a_tick_that_is_lost_is_said_to_be_left_out(
+    tmp_path: Path, run: Trajectory, ticks: Ticks
+) -> None:
+    ticks[5] = (ticks[5][0], [(topics.DIAGNOSTICS, bytes(16))])
     written(tmp_path / "bag", run.scene, ticks)
     [left] = recover(tmp_path / "bag", tmp_path / "new").left_out
     assert left.startswith("parts of 1 ticks, the first 5: no message on contact/left, ")

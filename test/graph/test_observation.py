@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-import rclpy
-from graphs import recordings_of
-from processes import DEADLINE, end_nodes
+from conftest import SECOND_DOMAIN
+from graphs import started
 from rclpy.parameter import Parameter
 
 from grasp_ros import scene as scenes
+from grasp_ros.graph import bag
 from grasp_ros.graph.bag.recording import Recording
 from grasp_ros.graph.bag.verify import verify
 from grasp_ros.graph.nodes.controller import Controller
@@ -88,7 +88,13 @@ def test_laws_that_see_more_give_the_same_bits_everywhere(tmp_path: Path, monkey
     laws = {"left_controller": "seeing_laws:Late", "right_controller": "seeing_laws:Slow"}
     four = Graph(case, tmp_path / "four", ACCURACY, laws=laws)
     one = Graph(case, tmp_path / "one", ACCURACY, laws=laws, one_process=True)
-    for recording in recordings_of(four, one, monkeypatch):
+    with started(four):
+        monkeypatch.setenv("ROS_DOMAIN_ID", SECOND_DOMAIN)
+        with started(one):
+            four.wait([])
+            one.wait([])
+    for graph in (four, one):
+        recording = bag.read(graph.bag)
         assert recording.state.tobytes() == simulated.state.tobytes()
         assert recording.command.tobytes() == simulated.command.tobytes()
         assert verify(recording).words == "701 states follow from the recorded inputs, bit for bit"
@@ -98,12 +104,11 @@ def test_laws_that_see_more_give_the_same_bits_everywhere(tmp_path: Path, monkey
 
 
 def test_a_node_refuses_a_scene_without_what_its_law_asks_for_and_numbers_that_do_not_act(
-    context: rclpy.Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    make: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "asking.py").write_text("def law(tick, time, x, v, x_object):\n    return x_object - x\n")
     monkeypatch.syspath_prepend(tmp_path)
-    law = [Parameter("law", value="asking:law")]
-    controller = Controller("left_controller", context=context, parameter_overrides=law)
+    controller = make(Controller, "left_controller", law="asking:law")
     with pytest.raises(Refused, match="law: asking:law: asks for x_object; the scene has no object"):
         controller._take(scenes.load("arm_alone"))
     controller._take(scenes.load("case_01"))
@@ -111,13 +116,3 @@ def test_a_node_refuses_a_scene_without_what_its_law_asks_for_and_numbers_that_d
     result = controller.set_parameters([Parameter(gain, value=9.0)])[0]
     assert result.reason == f"{gain}: {control.FIXED}"
     assert controller.set_parameters([Parameter(gain, value=5.0)])[0].successful
-    end_nodes(controller)
-
-
-@pytest.mark.slow
-def test_a_run_that_a_node_refuses_leaves_nothing(grasp_run: Any, tmp_path: Path) -> None:
-    (tmp_path / "asking.py").write_text("def law(tick, time, x, v, x_object):\n    return x_object - x\n")
-    run = grasp_run("arm_alone", "--controller", "left=asking:law")
-    err = run.communicate(timeout=DEADLINE)[1]
-    assert (run.returncode, "asks for x_object; the scene has no object" in err) == (2, True), err
-    assert not (tmp_path / "run").exists()

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from processes import DEADLINE, GRASP, START, children, growing, ran, wait_for
+from processes import DEADLINE, GRASP, START, children, ended, growing, ran, wait_for
 
 from grasp_ros import scene
 from grasp_ros.graph import bag, host
@@ -22,12 +22,6 @@ from grasp_ros.physics.errors import Failed
 from grasp_ros.scene.topics import JOINT_STATES
 
 pytestmark = pytest.mark.slow
-
-TERMINAL = """
-import fcntl, os, sys, termios
-fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-os.execv(sys.argv[1], sys.argv[1:])
-"""
 
 
 def check_bag(directory: Path) -> None:
@@ -78,8 +72,8 @@ def test_nothing_outlives_a_run_that_is_killed(grasp_run: Any, tmp_path: Path, o
 @pytest.mark.usefixtures("survivors")
 def test_a_terminal_that_is_closed_ends_a_run_cleanly(launch: Any, tmp_path: Path) -> None:
     ours, theirs = os.openpty()
-    words = [sys.executable, "-c", TERMINAL, *GRASP, "run", "case_01", "-o", "run"]
-    run = launch(*words, cwd=tmp_path, stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True)
+    words = ["setsid", "-c", *GRASP, "run", "case_01", "-o", "run"]  # whose terminal is that of its input
+    run = launch(*words, cwd=tmp_path, stdin=theirs, stdout=theirs, stderr=theirs)
     os.close(theirs)
     growing(tmp_path / "run" / "bag", 300_000)
     os.close(ours)
@@ -115,8 +109,8 @@ def test_shared_memory_of_a_killed_process_is_removed_and_no_other(launch: Any) 
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM])
 def test_a_long_command_ends_cleanly_on_a_signal(launch: Any, tmp_path: Path, number: signal.Signals) -> None:
     command = launch(
-        sys.executable, "-m", "grasp_ros.cli", "simulate", "case_01", "--set", "time.duration_s=1e6", "-o", "out.npz",
-        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        *GRASP, "simulate", "case_01", "--set", "time.duration_s=1e6", "-o", "out.npz", cwd=tmp_path,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )
     handlers = Path(f"/proc/{command.pid}/status")
 
@@ -126,8 +120,7 @@ def test_a_long_command_ends_cleanly_on_a_signal(launch: Any, tmp_path: Path, nu
 
     wait_for(caught, "the handlers")
     command.send_signal(number)
-    _, err = command.communicate(timeout=DEADLINE)
-    assert command.returncode == 130
+    _, err = ended(command, 130)
     assert err.splitlines()[-1] == "grasp: interrupted"
     assert not list(tmp_path.iterdir())
 
@@ -148,6 +141,6 @@ raise SystemExit(run(parser, []))
 
 
 def test_a_signal_of_which_an_import_has_made_another_error_is_an_interrupt() -> None:
-    """As that of numpy's extensions does it, whose advice on broken installations was shown."""
+    """As numpy does it, with advice on broken installations."""
     found = ran(sys.executable, "-c", IMPORTING)
     assert (found.returncode, found.stderr) == (130, "grasp: interrupted\n")

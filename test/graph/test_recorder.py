@@ -7,11 +7,9 @@ import os
 import re
 import resource
 import shutil
-import subprocess
 import sys
 import tracemalloc
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +23,7 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer as LibraryWriter
 from mcap_ros2.decoder import DecoderFactory
-from processes import wait_for
+from processes import DEADLINE, ran, wait_for
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
@@ -35,16 +33,15 @@ from grasp_ros.graph.bag.opening import Opened
 from grasp_ros.graph.bag.reading import Ticks
 from grasp_ros.graph.bag.recorder import HEAD, NOT_RECORDED, RESERVE_BYTES, Recorder
 from grasp_ros.graph.bag.recover import recover
-from grasp_ros.graph.bag.rosbag2 import INFORMATION, decode
+from grasp_ros.graph.bag.rosbag2 import INFORMATION
 from grasp_ros.graph.bag.storage import DATA_END_BYTES, SUM
 from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.serialization import template_of
 from grasp_ros.physics.errors import Refused
-from grasp_ros.scene.topics import COMMANDS, CONTACTS, DIAGNOSTICS, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, Topic
+from grasp_ros.scene.topics import DIAGNOSTICS, JOINT_STATES, Topic
 from grasp_ros.simulation import Trajectory, simulate
 from lab.drills import recorder as study
 
-SECONDS = 60.0
 LIMIT = 9 * RESERVE_BYTES // 4
 
 
@@ -82,13 +79,7 @@ def test_a_bag_is_the_run_bit_for_bit(closed: Path, run: Trajectory) -> None:
     assert {entry.name for entry in closed.iterdir()} == {"bag.mcap", "metadata.yaml"}
 
 
-def test_three_readers_take_it(closed: Path, run: Trajectory) -> None:
-    with Reader(closed) as reader:
-        store = get_typestore(Stores.ROS2_JAZZY)
-        states = [connection for connection in reader.connections if connection.topic == "/joint_states"]
-        found = [store.deserialize_cdr(raw, "sensor_msgs/msg/JointState") for _, _, raw in reader.messages(states)]
-        assert reader.message_count == 7 * len(run.t) + 2
-        assert [message.position[0] for message in found] == run.state[:, 0].tolist()
+def test_the_reader_of_the_library_takes_it(closed: Path, run: Trajectory) -> None:
     with storage(closed).open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
         summary = reader.get_summary()
@@ -234,22 +225,6 @@ def test_a_second_bag_behind_the_first_is_named(tmp_path: Path, closed: Path, ru
     assert found.ticks == len(run.t)
 
 
-def test_numbers_of_another_make_go_by_their_names_and_stand_alone(closed: Path, run: Trajectory) -> None:
-    reader, numbers = Ticks(Opened(closed)), [float(k) for k in range(len(LYAPUNOV_NAMES))]
-    message, store = decode(LYAPUNOV, template_of(LYAPUNOV).fill(0, numbers)), get_typestore(Stores.ROS2_JAZZY)
-    message = replace(message, name=message.name[::-1], position=message.position[::-1].copy())
-    assert reader.numbers(LYAPUNOV, store.serialize_cdr(message, LYAPUNOV.type))[2:] == numbers
-    message.name[0] = "vigour"
-    with pytest.raises(bag.BagError, match=r"/lyapunov: vigour, .*; allowed: V, "):
-        reader.numbers(LYAPUNOV, store.serialize_cdr(message, LYAPUNOV.type))
-    pushed = decode(CONTACTS["left"], template_of(CONTACTS["left"]).fill(0, (2.0,)))
-    pushed.wrench.force.y = 3.0
-    with pytest.raises(bag.BagError, match=r"contact/left: a force or torque beside force\.x; allowed: 0"):
-        reader.numbers(CONTACTS["left"], store.serialize_cdr(pushed, CONTACTS["left"].type))
-    foreign = store.serialize_cdr(pushed, COMMANDS["left"].type)  # a command of a stranger, who may send what he likes
-    assert reader.numbers(COMMANDS["left"], foreign) == [0, 0, 2.0]
-
-
 def test_stamps_are_whole_numbers_after_104_days(tmp_path: Path) -> None:
     """2^53 ns, from where on floating-point numbers have not every one."""
     scene = scenes.load("arm_alone", ["time.control_period_s=999.000000001", "time.duration_s=9990000.00001"])
@@ -313,7 +288,7 @@ def test_the_library_would_write_the_same_bytes(
         recorder.close()
         return storage(path / "bag").read_bytes()
 
-    monkeypatch.setattr("grasp_ros.graph.bag.recorder.FLUSH_SECONDS", SECONDS)
+    monkeypatch.setattr("grasp_ros.graph.bag.recorder.FLUSH_SECONDS", DEADLINE)
     monkeypatch.setattr("grasp_ros.graph.bag.recorder.CHUNK_BYTES", 20_000)
     own = record(tmp_path / "own")
     monkeypatch.setattr(Recorder, "_add", add)
@@ -384,31 +359,26 @@ def test_what_was_written_is_on_the_disk_soon_without_more_of_it(tmp_path: Path,
     [
         (shutil.rmtree, "was deleted during the recording"),
         (lambda path: os.truncate(path / "bag.mcap", 100), "was cut off by another program during the recording"),
+        (lambda path: path.rename(path.with_name("other")), "was moved during the recording"),
     ],
 )
-def test_a_bag_that_was_harmed_meanwhile_is_refused(
+def test_a_bag_that_was_harmed_meanwhile_is_refused_and_one_that_was_moved_opens(
     tmp_path: Path, run: Trajectory, harm: Callable[[Path], None], words: str
 ) -> None:
     recorder, ticks = Recorder(tmp_path / "bag", run.scene, {}), study.ticks_of(run)
+    recorder.write_tick(*next(ticks))
     harm(tmp_path / "bag")
     wait_for(lambda: bool(recorder._error), "the recorder to see it")
     with pytest.raises(bag.BagError, match=words):
         recorder.write_tick(*next(ticks))
     with pytest.raises(bag.BagError, match=words):
         recorder.close()
+    if "moved" in words:
+        assert bag.read(tmp_path / "other").tick.tolist() == [0]
 
 
-def test_a_bag_that_was_moved_meanwhile_ends_and_opens(tmp_path: Path, run: Trajectory) -> None:
-    recorder, ticks = Recorder(tmp_path / "bag", run.scene, {}), study.ticks_of(run)
-    recorder.write_tick(*next(ticks))
-    (tmp_path / "bag").rename(tmp_path / "other")
-    wait_for(lambda: bool(recorder._error), "the recorder to see it")
-    with pytest.raises(bag.BagError, match="was moved during the recording"):
-        recorder.close()
-    assert bag.read(tmp_path / "other").tick.tolist() == [0]
-
-
-def limited(path: Path, run: Trajectory, limit: int, answers: Any) -> None:
+def fill(path: Path, run: Trajectory, limit: int, answers: Any) -> None:
+    """Record without end in a process whose files are limited; how many ticks there were, and what ended it."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
     ticks, number = list(study.ticks_of(run)), 0
     try:
@@ -420,25 +390,26 @@ def limited(path: Path, run: Trajectory, limit: int, answers: Any) -> None:
         answers.put((number, str(error)))
 
 
+def limited(path: Path, run: Trajectory, limit: int) -> tuple[int, str]:
+    """What `fill` answers."""
+    context = multiprocessing.get_context("fork")
+    answers = context.Queue()
+    child = context.Process(target=fill, args=(path, run, limit, answers))
+    child.start()
+    found: tuple[int, str] = answers.get(timeout=DEADLINE)
+    child.join(DEADLINE)
+    return found
+
+
 @pytest.mark.slow
 def test_a_limit_that_leaves_no_room_is_no_full_disk(tmp_path: Path, run: Trajectory) -> None:
-    context = multiprocessing.get_context("fork")
-    answers = context.Queue()
-    child = context.Process(target=limited, args=(tmp_path / "bag", run, RESERVE_BYTES, answers))
-    child.start()
-    assert "no tick could be recorded: files may not be larger" in answers.get(timeout=SECONDS)[1]
-    child.join(SECONDS)
+    _, sentence = limited(tmp_path / "bag", run, RESERVE_BYTES)
+    assert "no tick could be recorded: files may not be larger" in sentence
 
 
 @pytest.mark.slow
-def test_a_limit_of_the_file_size_ends_the_bag_while_there_is_room(tmp_path: Path, run: Trajectory) -> None:
-    context = multiprocessing.get_context("fork")
-    answers = context.Queue()
-    long = simulate(scenes.load("case_01"), sampled=True)
-    child = context.Process(target=limited, args=(tmp_path / "bag", long, LIMIT, answers))
-    child.start()
-    number, sentence = answers.get(timeout=SECONDS)
-    child.join(SECONDS)
+def test_a_limit_of_the_file_size_ends_the_bag_while_there_is_room(tmp_path: Path) -> None:
+    number, sentence = limited(tmp_path / "bag", simulate(scenes.load("case_01"), sampled=True), LIMIT)
     assert "files may not be larger; the bag is closed, and whole up to there" in sentence
     recording = bag.read(tmp_path / "bag")
     ticks = len(recording.tick)
@@ -452,8 +423,6 @@ def test_a_limit_of_the_file_size_ends_the_bag_while_there_is_room(tmp_path: Pat
 
 FULL = """
 import sys
-import tracemalloc
-from collections.abc import Callable
 from pathlib import Path
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
@@ -484,12 +453,9 @@ except bag.BagError as error:
 def test_a_full_disk_ends_the_bag_while_there_is_room(tmp_path: Path) -> None:
     """A real one, in memory, where this process may mount it."""
     script = f'mount -t tmpfs -o size=6m none "$0" && exec {sys.executable} -c "$1" "$0"'
-    if subprocess.run(["unshare", "-rm", "true"], capture_output=True, check=False).returncode:
+    if ran("unshare", "-rm", "true").returncode:
         pytest.skip("no file system may be mounted here")
-    result = subprocess.run(
-        ["unshare", "-rm", "sh", "-c", script, str(tmp_path), FULL], capture_output=True, text=True, timeout=SECONDS,
-        check=False, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-    )
+    result = ran("unshare", "-rm", "sh", "-c", script, str(tmp_path), FULL)
     assert result.returncode == 0, result.stderr
     number, ticks, end, sentence = result.stdout.strip().split("|")
     assert int(ticks) >= int(number) >= 500
@@ -500,7 +466,6 @@ def test_a_full_disk_ends_the_bag_while_there_is_room(tmp_path: Path) -> None:
 def test_a_disk_that_is_full_at_the_first_byte_is_left_as_it_was(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Trajectory
 ) -> None:
-    """The next one, with space, was told that the directory is there."""
     def full(*_: Any, **__: Any) -> None:
         raise OSError(28, "No space left on device")
 

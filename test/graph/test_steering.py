@@ -8,16 +8,14 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from graphs import call, rewritten
-from processes import DEADLINE, GRASP, START, children, ran, wait_for
-from rclpy.executors import SingleThreadedExecutor
+from graphs import call, rewritten, status, whole
+from processes import DEADLINE, GRASP, START, children, ended, node_command, ran, wait_for
 from rclpy.experimental import EventsExecutor
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -25,7 +23,6 @@ from std_srvs.srv import Trigger
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
-from grasp_ros.graph.bag.verify import verify
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.serialization import raw_stamp_ns
 from grasp_ros.scene.topics import JOINT_STATES
@@ -43,52 +40,45 @@ def answer_of(shell: Any, words: str) -> str:
     return str(shell.stdout.readline())
 
 
-@pytest.fixture(scope="module")
-def steered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[int]]:
-    """A run that was steered at random: its directory, and the states that its bag must have from each beginning on."""
-    directory = tmp_path_factory.mktemp("steered") / "run"
-    with steering.steered(scene.load("case_01", ["time.duration_s=100"]), directory) as plant:
+@pytest.fixture
+def paused(grasp_run: Any, launch: Any) -> Callable[..., tuple[Any, Any, Callable[[str], str]]]:
+    """Starts a run that waits at its first state: its process, a shell of `ctl`, and what asks it."""
+    def call(*words: str) -> tuple[Any, Any, Callable[[str], str]]:
+        run, shell = grasp_run(*words, "--paused", "--no-figure"), launch(*GRASP, "ctl", **PIPES)
+        ask = partial(answer_of, shell)
+        wait_for(lambda: "paused at tick 0 of" in ask("status"), "the first state")
+        return run, shell, ask
+
+    return call
+
+
+def test_random_steering_leaves_a_bag_that_verifies(tmp_path: Path) -> None:
+    """`python -m lab steering --calls 1000` makes more calls."""
+    step = [*GRASP, "ctl", "step", "7"]
+    with steering.steered(scene.load("case_01", ["time.duration_s=100"]), tmp_path / "run") as plant:
         done = steering.steer(plant, CALLS, SEED)
         assert {"pause done", "resume done", "resume refused", "step done", "step refused", "reset done"} <= set(done)
-        command = [*GRASP, "ctl", "step", "7"]
-        said = ran(*command)
+        said = ran(*step)
         assert (said.returncode, said.stderr) == (0, "")
         plant.tick += 7
         assert f"case_01: paused at tick {plant.tick} of 100000" in said.stdout
         plant.settle()
         plant.expect("resume")
-        refused = ran(*command)
+        refused = ran(*step)
         assert (refused.returncode, refused.stdout) == (1, "")
         assert "not paused; allowed: step of a paused plant" in refused.stderr
         plant.tick = plant.expect("pause")["tick"]
         plant.settle()  # it is paused as soon as this tick is answered
-    return directory, [*plant.lengths, plant.tick + 1]
-
-
-@pytest.mark.thorough
-def test_random_steering_leaves_a_bag_that_verifies(steered: tuple[Path, list[int]]) -> None:
-    """`python -m lab steering --calls 1000` makes more calls."""
-    directory, lengths = steered
+    lengths = [*plant.lengths, plant.tick + 1]
     assert len(lengths) > 5
-    assert steering.problems(directory / "bag", lengths) == []
+    assert steering.problems(tmp_path / "run" / "bag", lengths) == []
     lengths[2] += 1
-    assert "first difference: run 2" in " ".join(steering.problems(directory / "bag", lengths))
-    assert bag.read(directory / "bag").closed
-
-
-def test_one_flipped_bit_in_a_bag_is_found_and_named(steered: tuple[Path, list[int]]) -> None:
-    recording = bag.read(steered[0] / "bag")
-    row, state = int(recording.starts[1]) - 2, recording.state.copy()
-    state[row].view(np.int64)[4] ^= 1
-    (x, other), tick = (float(states[row, 4]) for states in (recording.state, state)), recording.tick[row]
-    words = f"joint_states, right position: recorded {other!r} ({other.hex()}), computed {x!r} ({x.hex()})"
-    assert verify(replace(recording, state=state)).words == f"NOT EQUAL, first at tick {tick}, {words}"
+    assert "first difference: run 2" in " ".join(steering.problems(tmp_path / "run" / "bag", lengths))
+    assert bag.read(tmp_path / "run" / "bag").closed
 
 
 @pytest.mark.parametrize("rate", [1.5, 100.0])  # the second is faster than any reader, and waits for it
-def test_a_bag_is_published_again_with_its_clock(
-    recorded: Path, node: tuple[Any, SingleThreadedExecutor], launch: Any, rate: float
-) -> None:
+def test_a_bag_is_published_again_with_its_clock(recorded: Path, node: Any, launch: Any, rate: float) -> None:
     peer, slow = node
     slow.remove_node(peer)
     seen: dict[str, list[int]] = {"states": [], "clock": []}
@@ -112,67 +102,45 @@ def test_a_bag_is_published_again_with_its_clock(
         assert rows == [tick * 1_000_000 for tick in range(3001)], name
 
 
-@pytest.mark.parametrize(("kind", "seconds"), [((), 0.0), (("--free-running",), 4.0)])
+@pytest.mark.parametrize(("kind", "seconds"), [((), 0.0), (("--free-running",), 2.0)])
 def test_a_plant_that_was_stepped_to_the_end_is_put_back_or_let_finish(
-    grasp_run: Any, launch: Any, kind: tuple[str, ...], seconds: float
+    paused: Any, kind: tuple[str, ...], seconds: float
 ) -> None:
-    """The monitor closed its bag at the last tick, and lost a free run's steps, which did not wait for it.
-
-    Steps follow the wall clock where a run does: commands of a controller at a rate of its own timed out.
-    """
-    run = grasp_run("arm_alone", "--set", "time.duration_s=4", "--paused", "--no-figure", *kind)
-    shell = launch(*GRASP, "ctl", **PIPES)
-    ask = partial(answer_of, shell)
-    wait_for(lambda: "paused at tick 0 of" in ask("status"), "the first state")
+    """Steps follow the wall clock where a run does: a controller may have a rate of its own."""
+    run, shell, ask = paused("arm_alone", "--set", "time.duration_s=2", *kind)
     begin = time.monotonic()
-    assert ask("step 4000").startswith("arm_alone: paused at tick 4000 of 4000")
+    assert ask("step 2000").startswith("arm_alone: paused at tick 2000 of 2000")
     assert time.monotonic() - begin > seconds
-    assert ask("reset").startswith("arm_alone: paused at tick 0 of 4000, t = 0 s, resets: 1")
-    assert ask("step 4000").startswith("arm_alone: paused at tick 4000 of 4000")
+    assert ask("reset").startswith("arm_alone: paused at tick 0 of 2000, t = 0 s, resets: 1")
+    assert ask("step 2000").startswith("arm_alone: paused at tick 2000 of 2000")
     shell.communicate("resume\n", timeout=DEADLINE)
-    out, err = run.communicate(timeout=DEADLINE)
-    assert (run.returncode, "8002 states follow" in out) == (0, True), out + err
+    assert "4002 states follow" in ended(run)[0]
 
 
-def test_a_monitor_that_was_behind_has_all_commands_of_a_free_run(
-    grasp_run: Any, launch: Any, tmp_path: Path
-) -> None:
-    """It took the last hundred that waited when the plant had ended: others that had acted were not in the bag."""
-    run = grasp_run("arm_alone", "--set", "time.duration_s=0.45", "--paused", "--no-figure", "--free-running")
-    shell = launch(*GRASP, "ctl", **PIPES)
-    ask = partial(answer_of, shell)
-    wait_for(lambda: "paused at tick 0 of" in ask("status"), "the first state")
+def test_a_monitor_that_was_behind_has_all_commands_of_a_free_run(paused: Any, tmp_path: Path) -> None:
+    run, shell, ask = paused("arm_alone", "--set", "time.duration_s=0.45", "--free-running")
     assert ask("step 1").startswith("arm_alone: paused at tick 1 of")  # it has begun: the monitor has had a command
     monitor = children(tmp_path)["monitor"]
     os.kill(monitor, signal.SIGSTOP)
     assert ask("step 448").startswith("arm_alone: paused at tick 449 of 450")  # at the last one the plant waits for it
     shell.communicate("resume\n", timeout=DEADLINE)
     os.kill(monitor, signal.SIGCONT)
-    out, err = run.communicate(timeout=DEADLINE)
-    assert (run.returncode, "451 states follow" in out) == (0, True), out + err
+    assert "451 states follow" in ended(run)[0]
 
 
-def test_resets_in_a_row_lose_nothing_of_a_free_run(grasp_run: Any, launch: Any, tmp_path: Path) -> None:
-    """A monitor took what came after a reset for what came before: contact forces and laws were missing."""
-    run = grasp_run("case_01", "--set", "time.duration_s=0.2", "--paused", "--no-figure", "--free-running")
-    shell = launch(*GRASP, "ctl", **PIPES)
-    ask = partial(answer_of, shell)
-    wait_for(lambda: "paused at tick 0 of" in ask("status"), "the first state")
+def test_resets_in_a_row_lose_nothing_of_a_free_run(paused: Any, tmp_path: Path) -> None:
+    run, shell, ask = paused("case_01", "--set", "time.duration_s=0.2", "--free-running")
     for number in range(1, 9):
         assert ask("step 5").startswith("case_01: paused at tick 5")
         assert ask("reset").startswith(f"case_01: paused at tick 0 of 200, t = 0 s, resets: {number}")
     shell.communicate("resume\n", timeout=DEADLINE)
-    out, err = run.communicate(timeout=DEADLINE)
-    assert run.returncode == 0, out + err
-    recording = bag.read(tmp_path / "run" / "bag")
-    assert not any(recording.missing.values())
-    assert recording.closed
+    ended(run)
+    assert whole(tmp_path / "run" / "bag").closed
 
 
 def test_a_bag_of_another_program_is_published_from_its_first_message_on_or_refused(
     recorded: Path, tmp_path: Path
 ) -> None:
-    """A foreign topic ended in a traceback, times of a wall clock in a wait without end."""
     [file] = recorded.glob("*.mcap")
     for name, options in (("beside", {"beside": "/theirs"}), ("wall", {"late_ns": 1_800_000_000 * 10**9})):
         rewritten(file, tmp_path / f"{name}.mcap", **options)
@@ -194,8 +162,7 @@ def test_a_bag_is_not_published_beside_another_one(recorded: Path, launch: Any, 
 
 def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
     """Over one node, so that discovery is paid for once."""
-    plant = [*START, "plant", "--ros-args", "-p", "scene:=arm_alone", "-p", "paused:=true"]
-    launch(*plant, stderr=subprocess.DEVNULL)
+    launch(*node_command("plant", scene="arm_alone", paused="true"), stderr=subprocess.DEVNULL)
     launch(*START, "left_controller", stderr=subprocess.DEVNULL)
     shell = launch(*GRASP, "ctl", **PIPES)
     ask = partial(answer_of, shell)
@@ -227,17 +194,15 @@ def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
     assert shell.returncode == 2  # that of the worst line, which nobody takes; of one that fails it is 1
 
 
-def test_a_pause_ends_a_step_that_goes_on(node: tuple[Any, SingleThreadedExecutor], launch: Any) -> None:
-    """It said "already paused", and the plant went on."""
-    plant = [*START, "plant", "--ros-args", "-p", "scene:=arm_alone", "-p", "paused:=true", "-p", "steps:=15000"]
-    launch(*plant, stderr=subprocess.DEVNULL)
+def test_a_pause_ends_a_step_that_goes_on(node: Any, launch: Any) -> None:
+    launch(*node_command("plant", scene="arm_alone", paused="true", steps=15000), stderr=subprocess.DEVNULL)
     launch(*START, "left_controller", stderr=subprocess.DEVNULL)
     begun = json.loads(call("step", node).message)
     assert (begun["goal"]["tick"], begun["asked"]) == (15000, 15000)
-    wait_for(lambda: json.loads(call("status", node).message)["tick"] > 10, "some steps")
-    paused = call("pause", node)
-    found = [json.loads(answer.message) for answer in (paused, call("status", node))]
-    assert paused.success
+    wait_for(lambda: status(node)["tick"] > 10, "some steps")
+    answer = call("pause", node)
+    found = [json.loads(answer.message), status(node)]
+    assert answer.success
     assert [(own["state"], own["steps"], own["tick"]) for own in found] == [("paused", 0, found[0]["tick"])] * 2
     assert found[0]["tick"] < 15000
 
@@ -278,17 +243,19 @@ def test_a_graph_runs_without_any_standard_stream(tmp_path: Path) -> None:
     assert len(bag.read(tmp_path / "run" / "bag").t) == 201
 
 
-def test_where_nobody_answers_ctl_says_so(launch: Any) -> None:
+def test_where_nobody_answers_ctl_and_watch_say_so(launch: Any) -> None:
     """All at once: each waits for long."""
-    asked = {"status": "no plant answers in ROS domain", "get nobody steps": "no nobody answers in ROS domain",
-             "echo nothing": "nobody publishes /nowhere/nothing"}
-    waiting = [launch(*GRASP, "ctl", *words.split(), "--namespace", "/nowhere", **PIPES) for words in asked]
+    here = f"in ROS domain {os.environ['ROS_DOMAIN_ID']}, namespace /nowhere, on this host"
+    asked = {"ctl status": f"no plant answers {here}", "ctl get nobody steps": f"no nobody answers {here}",
+             "ctl echo nothing": "nobody publishes /nowhere/nothing", "watch": f"no plant has come for 10 s {here}"}
+    waiting = [launch(*GRASP, *words.split(), "--namespace", "/nowhere", **PIPES) for words in asked]
     for process, said in zip(waiting, asked.values(), strict=True):
-        out, err = process.communicate(timeout=DEADLINE)
-        assert (process.returncode, out, said in err) == (1, "", True), err
+        out, err = ended(process, 1)
+        assert said in err
+        assert out in ("", f"waiting for a plant {here}")
 
 
-def test_an_answer_that_is_no_plants_is_named(node: tuple[Any, SingleThreadedExecutor], launch: Any) -> None:
+def test_an_answer_that_is_no_plants_is_named(node: Any, launch: Any) -> None:
     def answer(_: Any, response: Trigger.Response) -> Trigger.Response:
         response.success, response.message = True, "hello"
         return response

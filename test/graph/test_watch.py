@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import fcntl
 import io
-import json
 import os
 import pty
 import re
@@ -19,9 +18,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from graphs import call
+from graphs import call, started, status
 from processes import DEADLINE, GRASP, START, node_command, ran, wait_for
-from rclpy.executors import SingleThreadedExecutor
 from rich.console import Console
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -34,20 +32,10 @@ from grasp_ros.graph.ros.messages import qos
 from grasp_ros.graph.terminal import HINT, View, moment_of
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.scene.topics import JOINT_STATES, SCENE
-from grasp_ros.simulation import simulate
-from lab.drills import recorder
 
 pytestmark = pytest.mark.slow  # real processes
 SHELL = 'trap : INT TERM HUP; "$@"; echo "status $?"; read end'  # the terminal is there as long as it is
 RIGHT, LEFT, INTERRUPT = b"\x1b[C", b"\x1b[D", b"\x03"
-
-
-@pytest.fixture(scope="module")
-def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A bag of two seconds."""
-    path = tmp_path_factory.mktemp("watched") / "bag"
-    recorder.write(path, simulate(scenes.load("case_01", ["time.duration_s=2"]), sampled=True))
-    return path
 
 
 class Screen:
@@ -121,9 +109,9 @@ def time_in(picture: str) -> float:
     return float(re.findall(r"t = (\S+) s", picture)[0])
 
 
-def test_keys_pause_step_and_end_a_bag(launch: Any, path: Path) -> None:
-    recording = bag.read(path)
-    screen = Screen(launch, *watch(path, "--rate", "0.05", "--from", "1.5"))
+def test_keys_pause_step_and_end_a_bag(launch: Any, recorded: Path) -> None:
+    recording = bag.read(recorded)
+    screen = Screen(launch, *watch(recorded, "--rate", "0.05", "--from", "1.5"))
     assert time_in(screen.wait("0.05 s per second")) == pytest.approx(1.5, abs=0.1)
     assert not screen.as_before
     screen.press(b" ")
@@ -139,10 +127,10 @@ def test_keys_pause_step_and_end_a_bag(launch: Any, path: Path) -> None:
     assert screen.end() == 0
 
 
-def test_a_bag_is_shown_to_its_end(launch: Any, path: Path) -> None:
-    recording = bag.read(path)
-    screen = Screen(launch, *watch(path, "--rate", "3"), columns=90)
-    picture = screen.wait("t = 2.000 s")
+def test_a_bag_is_shown_to_its_end(launch: Any, recorded: Path) -> None:
+    recording = bag.read(recorded)
+    screen = Screen(launch, *watch(recorded, "--rate", "3"), columns=90)
+    picture = screen.wait("t = 3.000 s")
     assert f"{recording.state[-1, 0]:+.5f}" in picture
     assert f"{recording.energy.V_c[-1]:.6g} J" in picture
     assert screen.end() == 0
@@ -159,9 +147,7 @@ def test_a_plant_that_was_paused_before_anybody_watched_is_said_to_be_and_steps(
     assert screen.end() == 0
 
 
-def test_a_plant_of_others_may_answer_whatever_it_likes(
-    launch: Any, node: tuple[Any, SingleThreadedExecutor]
-) -> None:
+def test_a_plant_of_others_may_answer_whatever_it_likes(launch: Any, node: Any) -> None:
     peer, executor = node
     answers = iter(["hello", "[]", '{"a": 1}', '{"state": 1, "tick": Infinity}'])
 
@@ -177,10 +163,7 @@ def test_a_plant_of_others_may_answer_whatever_it_likes(
     assert screen.end() == 0
 
 
-def test_states_without_the_bodies_of_the_scene_are_passed_over(
-    launch: Any, node: tuple[Any, SingleThreadedExecutor]
-) -> None:
-    """They were drawn, with bodies at nan."""
+def test_states_without_the_bodies_of_the_scene_are_passed_over(launch: Any, node: Any) -> None:
     peer, executor = node
     latched = peer.create_publisher(String, SCENE.name, qos(SCENE))
     latched.publish(String(data=scenes.load("arm_alone").to_yaml()))
@@ -200,8 +183,8 @@ def test_states_without_the_bodies_of_the_scene_are_passed_over(
 @pytest.mark.parametrize(
     ("ending", "status"), [(b"q", 0), (INTERRUPT, 130), (signal.SIGTERM, 130), (signal.SIGHUP, 130)]
 )
-def test_the_terminal_is_given_back_however_it_ends(launch: Any, path: Path, ending: Any, status: int) -> None:
-    screen = Screen(launch, *watch(path, "--rate", "0.01"), columns=40)
+def test_the_terminal_is_given_back_however_it_ends(launch: Any, recorded: Path, ending: Any, status: int) -> None:
+    screen = Screen(launch, *watch(recorded, "--rate", "0.01"), columns=40)
     screen.wait("t = ")
     assert not screen.as_before
     if isinstance(ending, bytes):
@@ -213,8 +196,8 @@ def test_the_terminal_is_given_back_however_it_ends(launch: Any, path: Path, end
 
 
 @pytest.mark.parametrize("width", [100, 80, 66, 65, 40])
-def test_the_picture_is_whole_at_every_width(path: Path, width: int) -> None:
-    recording = bag.read(path)
+def test_the_picture_is_whole_at_every_width(recorded: Path, width: int) -> None:
+    recording = bag.read(recorded)
     row = int(np.argmax(recording.outputs["contact/left"]))
     for closed in (1.0, 0.0):
         console = Console(width=width, file=io.StringIO(), color_system=None)
@@ -236,9 +219,9 @@ def test_the_picture_is_whole_at_every_width(path: Path, width: int) -> None:
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e308, 9.0])
 @pytest.mark.parametrize("name", ["V", "V_c", "mode", "alarm", "closed"])
-def test_whatever_a_bag_says_of_the_energy_is_shown(path: Path, name: str, value: float) -> None:
+def test_whatever_a_bag_says_of_the_energy_is_shown(recorded: Path, name: str, value: float) -> None:
     """Numbers of the monitor need not be finite; `grasp verify` says which are wrong."""
-    recording, console = bag.read(path), Console(width=80, file=io.StringIO(), color_system=None)
+    recording, console = bag.read(recorded), Console(width=80, file=io.StringIO(), color_system=None)
     view, moment = View(recording.scene), moment_of(recording, 1, "paused")
     for level in ({**moment.level, name: value}, moment.level):
         console.print(view.draw(moment._replace(level=level), 80))
@@ -248,45 +231,37 @@ def test_whatever_a_bag_says_of_the_energy_is_shown(path: Path, name: str, value
 
 @pytest.mark.parametrize(
     ("options", "words"),
-    [(["--from", "2.5"], "--from: 2.5 is not allowed; allowed: 0 to 2 s"),
-     (["--from", "nan"], "--from: nan is not allowed; allowed: 0 to 2 s"),
+    [(["--from", "3.5"], "--from: 3.5 is not allowed; allowed: 0 to 3 s"),
+     (["--from", "nan"], "--from: nan is not allowed; allowed: 0 to 3 s"),
      (["--rate", "0"], "--rate: 0.0 is not allowed; allowed: 1e-06 to 1e+06")],
 )
-def test_what_cannot_be_shown_is_refused(path: Path, command: Any, options: list[str], words: str) -> None:
-    found = command("watch", str(path), *options)
+def test_what_cannot_be_shown_is_refused(recorded: Path, command: Any, options: list[str], words: str) -> None:
+    found = command("watch", str(recorded), *options)
     assert (found.returncode, found.stderr) == (2, f"grasp: {words}\n")
     for option in ("--from", "--rate"):
         assert command("watch", option, "1").stderr == f"grasp: {option} 1.0 is not allowed; allowed: with a bag\n"
     assert command("watch", "bag", "--namespace", "/x").stderr.endswith("of a graph; allowed: without a bag\n")
 
 
-def test_keys_pause_and_step_a_running_plant(
-    launch: Any, tmp_path: Path, node: tuple[Any, SingleThreadedExecutor]
-) -> None:
-    def status() -> dict[str, Any]:
-        return json.loads(call("status", node).message)  # type: ignore[no-any-return]
-
+def test_keys_pause_and_step_a_running_plant(launch: Any, tmp_path: Path, node: Any) -> None:
     case = scenes.load("case_01", ["time.duration_s=1000"])
     graph = Graph(case, tmp_path / "run", ACCURACY, one_process=True)
-    graph.start()
-    try:
+    with started(graph):
         screen = Screen(launch, *START, "watch")
         screen.wait(r"[1-9]\d* ticks/s")
         screen.press(b" ")
-        wait_for(lambda: status()["state"] == "paused", "a pause")
-        tick = status()["tick"]
+        wait_for(lambda: status(node)["state"] == "paused", "a pause")
+        tick = status(node)["tick"]
         for step in (1, 2):
             screen.press(RIGHT)
             screen.wait(f"t = {case.time_of(tick + step):.3f} s")
-            assert (status()["tick"], status()["state"]) == (tick + step, "paused")
+            assert (status(node)["tick"], status(node)["state"]) == (tick + step, "paused")
         assert call("reset", node).success
-        screen.wait(r"t = 0\.000 s   paused")  # what belongs to the first state was taken for what came before
+        screen.wait(r"t = 0\.000 s   paused")  # what came before the reset is not drawn beside it
         screen.press(b" ")
-        wait_for(lambda: status()["tick"] > tick + 10, "the run to go on")
+        wait_for(lambda: status(node)["tick"] > tick + 10, "the run to go on")
         screen.press(RIGHT)
-        wait_for(lambda: status()["state"] == "paused", "a pause")
+        wait_for(lambda: status(node)["state"] == "paused", "a pause")
         screen.press(b"q")
         assert screen.end() == 0
         assert screen.as_before
-    finally:
-        graph.stop()
