@@ -244,11 +244,12 @@ def test_a_graph_runs_without_any_standard_stream(tmp_path: Path) -> None:
 
 
 def test_where_nobody_answers_ctl_and_watch_say_so(launch: Any) -> None:
-    """All at once: each waits for long."""
+    """All at once: each waits for long. None needs a home directory."""
     here = f"in ROS domain {os.environ['ROS_DOMAIN_ID']}, namespace /nowhere, on this host"
     asked = {"ctl status": f"no plant answers {here}", "ctl get nobody steps": f"no nobody answers {here}",
              "ctl echo nothing": "nobody publishes /nowhere/nothing", "watch": f"no plant has come for 10 s {here}"}
-    waiting = [launch(*GRASP, *words.split(), "--namespace", "/nowhere", **PIPES) for words in asked]
+    homeless = {**os.environ, "HOME": "/proc/nowhere"}
+    waiting = [launch(*GRASP, *words.split(), "--namespace", "/nowhere", env=homeless, **PIPES) for words in asked]
     for process, said in zip(waiting, asked.values(), strict=True):
         out, err = ended(process, 1)
         assert said in err
