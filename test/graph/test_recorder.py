@@ -32,7 +32,7 @@ from rosbags.typesys import Stores, get_typestore
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.opening import Opened
-from grasp_ros.graph.bag.reading import Ticks
+from grasp_ros.graph.bag.reading import BagReader
 from grasp_ros.graph.bag.recorder import HEAD, NOT_RECORDED, RESERVE_BYTES, Recorder
 from grasp_ros.graph.bag.recover import recover
 from grasp_ros.graph.bag.rosbag2 import INFORMATION, decode
@@ -235,7 +235,7 @@ def test_a_second_bag_behind_the_first_is_named(tmp_path: Path, closed: Path, ru
 
 
 def test_numbers_of_another_make_go_by_their_names_and_stand_alone(closed: Path, run: Trajectory) -> None:
-    reader, numbers = Ticks(Opened(closed)), [float(k) for k in range(len(LYAPUNOV_NAMES))]
+    reader, numbers = BagReader(Opened(closed)), [float(k) for k in range(len(LYAPUNOV_NAMES))]
     message, store = decode(LYAPUNOV, template_of(LYAPUNOV).fill(0, numbers)), get_typestore(Stores.ROS2_JAZZY)
     message = replace(message, name=message.name[::-1], position=message.position[::-1].copy())
     assert reader.numbers(LYAPUNOV, store.serialize_cdr(message, LYAPUNOV.type))[2:] == numbers
@@ -254,7 +254,7 @@ def test_stamps_are_whole_numbers_after_104_days(tmp_path: Path) -> None:
     """2^53 ns, from where on floating-point numbers have not every one."""
     scene = scenes.load("arm_alone", ["time.control_period_s=999.000000001", "time.duration_s=9990000.00001"])
     written(tmp_path / "bag", scene, [])
-    reader, template = Ticks(Opened(tmp_path / "bag")), template_of(JOINT_STATES, ["left"])
+    reader, template = BagReader(Opened(tmp_path / "bag")), template_of(JOINT_STATES, ["left"])
     for time_ns in [tick * scene.period_ns for tick in range(9010, 9020)]:
         reader.row(time_ns, {JOINT_STATES: template.fill(time_ns, (0.1, 0.0, 0.0))})
         assert reader.stamp_ns == time_ns
