@@ -187,7 +187,8 @@ def _report(graph: Graph, stopped: bool, spent: list[tuple[float, str]], options
     from grasp_ros.graph.bag.verify import verify
 
     recording = read(graph.bag)
-    rows, whole = report.describe_recording(recording, summary(recording)), keeps(recording, options)
+    found = summary(recording)
+    rows, whole = report.describe_recording(recording, found), keeps(found, options)
     spent.append((time.monotonic(), "reading"))
     if stopped:
         rows.append(("interrupted", f"not verified and not drawn; `grasp verify` and `grasp plot` {graph.bag} do that"))
