@@ -230,7 +230,7 @@ def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[
         if (topic := CONTACTS[side].name) in recording.outputs:
             force = impact_force(Contact(*system.pairs[SIDES[side]]), u, d)
             yield (topic, "force", recording.outputs[topic][rows], force)
-    external = system.external_over(np.arange(len(rows))) if system.external else np.zeros((len(rows), 3))
+    external = system.external_over(np.arange(len(rows)))
     for name, body in BODIES.items():
         if (topic := EXTERNAL_FORCES[name].name) in recording.outputs:
             yield (topic, "force", recording.outputs[topic][rows], external[:, body])
