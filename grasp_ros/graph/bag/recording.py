@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate, pairwise
@@ -21,7 +22,7 @@ from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.effects.base import BODIES, SIDES
-from grasp_ros.scene.topics import CLOCK, CONTACTS, EXTERNAL_FORCES, LYAPUNOV_NAMES
+from grasp_ros.scene.topics import CLOCK, CONTACTS, DIAGNOSTICS, EXTERNAL_FORCES, LYAPUNOV_NAMES, TIMING
 from grasp_ros.simulation import Trajectory, simulate
 from grasp_ros.simulation.tables import Tabular
 
@@ -183,6 +184,22 @@ class Recording(Tabular, Frozen):
     def whole(self) -> bool:
         """Whether it has every tick from the begin of the scene on, without a reset."""
         return self.starts.tolist() == [0] and not (np.diff(self.tick) != 1).any()
+
+    @property
+    def size(self) -> int:
+        """Bytes of the bag on the disk."""
+        files = self.path.iterdir() if self.path.is_dir() else [self.path]
+        return sum(file.stat().st_size for file in files if file.is_file())
+
+    @property
+    def rates(self) -> dict[str, float]:
+        """Mean rates of the messages in the bag's time, in Hz, by topic.
+
+        NaN for one message alone, and for what goes by wall time.
+        """
+        span, others = float(self.t[-1] - self.t[0]) or math.nan, (DIAGNOSTICS.name, TIMING.name)
+        return {name: (count - 1) / span if count > 1 and name not in others else math.nan
+                for name, count in self.counts.items()}
 
     @property
     def law_known(self) -> np.ndarray:

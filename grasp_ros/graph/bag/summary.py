@@ -13,9 +13,7 @@ from grasp_ros.graph.bag.recording import Recording, check_recording
 from grasp_ros.graph.bag.verify import Verification
 from grasp_ros.physics.model import Mode
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.topics import DIAGNOSTICS, LYAPUNOV_NAMES, TIMING
-
-BY_WALL_TIME = (DIAGNOSTICS.name, TIMING.name)  # topics without a rate in the time of a bag
+from grasp_ros.scene.topics import LYAPUNOV_NAMES
 
 
 def summary(recording: Recording) -> dict[str, Any]:
@@ -24,17 +22,15 @@ def summary(recording: Recording) -> dict[str, Any]:
     V is twice the energy. `topics` are those that have a message; their rates are means over the bag's time. `contacts`
     is how often a pair began to touch, as far as the ticks show it.
     """
-    scene, running, path = check_recording(recording).scene, recording.running, recording.path
-    files = path.iterdir() if path.is_dir() else [path]
+    scene, running, rates = check_recording(recording).scene, recording.running, recording.rates
     found: dict[str, Any] = {
-        "bag": str(path), "size_bytes": sum(file.stat().st_size for file in files if file.is_file()),
-        "title": scene.title, "watch": scene.watch,
+        "bag": str(recording.path), "size_bytes": recording.size, "title": scene.title, "watch": scene.watch,
         "warnings": list(scene.warnings), "feedback": scene.feedback_in_words(sampled=True),
         "lockstep": running.lockstep, "accuracy": running.accuracy, "resets": recording.resets,
         "ticks": len(recording.tick), "begin_s": float(recording.t[0]),
         "duration_s": float(recording.t[-1] - recording.t[0]), "scene_duration_s": scene.duration,
-        "topics": {name: {"messages": count, "rate_Hz": _rate(recording, name)}
-                   for name, count in recording.counts.items() if count},
+        "topics": {name: {"messages": count, "rate_Hz": rates[name]} for name, count in recording.counts.items()
+                   if count},
         "missing": {name: count for name, count in recording.missing.items() if count},
         "end": recording.lost["end"], "recorded_with": dict(recording.versions),
         "changes": [{"tick": tick, "time_s": scene.time_of(tick), **numbers}
@@ -54,12 +50,6 @@ def summary(recording: Recording) -> dict[str, Any]:
             "timed_out_periods": {side: int(last[f"{side}_timed_out_all"]) for side in sides},
         }
     return found
-
-
-def _rate(recording: Recording, name: str) -> float:
-    """Mean rate of a topic in Hz; NaN for one message alone, and for what goes by wall time."""
-    span, count = float(recording.t[-1] - recording.t[0]), recording.counts[name]
-    return (count - 1) / span if span and count > 1 and name not in BY_WALL_TIME else math.nan
 
 
 def _levels(recording: Recording) -> dict[str, Any]:
