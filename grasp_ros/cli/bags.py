@@ -7,12 +7,15 @@ import math
 import os
 import sys
 from textwrap import shorten
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from grasp_ros.cli.arguments import add_command, add_directory, add_file, add_json, named
 from grasp_ros.cli.checks import check_output, prepare, warn
 from grasp_ros.cli.output import destination, show
 from grasp_ros.physics.errors import Refused
+
+if TYPE_CHECKING:  # what is not asked for is not imported, which takes a while
+    from grasp_ros.graph.bag.recording import Recording
 
 MOST_LETTERS = 200  # of the ticks that a recovered bag lacks
 
@@ -47,14 +50,14 @@ def check_limits(options: argparse.Namespace, lockstep: bool) -> None:
             raise Refused(f"{name} {limit:g} is not allowed; allowed: for a free run, a number >= 0")
 
 
-def keeps(found: dict[str, Any], options: argparse.Namespace) -> bool:
-    """Whether a run kept the limits that were stated, by the `summary` of its bag; says which it did not keep."""
-    broken, reached = [], found.get("reached_s_per_s", math.nan)
-    oldest = max((age["max"] for age in found.get("command_age_periods", {}).values()), default=math.nan)
+def keeps(recording: Recording, options: argparse.Namespace) -> bool:
+    """Whether a run kept the limits that were stated; says which it did not keep."""
+    broken = []
+    oldest = max((most for _, most in recording.ages.values()), default=math.nan)
     if options.max_age is not None and not oldest <= options.max_age:
         broken.append(f"--max-age {options.max_age:g}: the oldest command was {oldest:g} periods old")
-    if options.min_factor is not None and not reached >= options.min_factor:
-        broken.append(f"--min-factor {options.min_factor:g}: {reached:.3g} s per second was reached")
+    if options.min_factor is not None and not recording.reached >= options.min_factor:
+        broken.append(f"--min-factor {options.min_factor:g}: {recording.reached:.3g} s per second was reached")
     for words in broken:
         print(f"grasp: {words}", file=sys.stderr)
     return not broken
@@ -87,7 +90,7 @@ def _inspect(options: argparse.Namespace) -> int:
     if options.output is not None:
         with destination(options.output) as file:
             recording.to_csv(file)
-    return 0 if keeps(found, options) else 1
+    return 0 if keeps(recording, options) else 1
 
 
 def _verify(options: argparse.Namespace) -> int:

@@ -187,8 +187,7 @@ def _report(graph: Graph, stopped: bool, spent: list[tuple[float, str]], options
     from grasp_ros.graph.bag.verify import verify
 
     recording = read(graph.bag)
-    found = summary(recording)
-    rows, whole = report.describe_recording(recording, found), keeps(found, options)
+    rows, whole = report.describe_recording(recording, summary(recording)), keeps(recording, options)
     spent.append((time.monotonic(), "reading"))
     if stopped:
         rows.append(("interrupted", f"not verified and not drawn; `grasp verify` and `grasp plot` {graph.bag} do that"))

@@ -28,7 +28,6 @@ from sensor_msgs.msg import JointState
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
-from grasp_ros.graph.bag.summary import summary
 from grasp_ros.graph.bag.verify import verify
 from grasp_ros.graph.health import watchdog
 from grasp_ros.graph.health.peers import PeerNode
@@ -192,20 +191,19 @@ def test_a_slow_controller_answers_the_newest_state_and_its_age_is_shown(
     run = grasp_run(*THREE_SECONDS, "--free-running", "2", "--controller", "left=slow:law", *limits)
     out, err = run.communicate(timeout=DEADLINE)
     recording = bag.read(tmp_path / "run" / "bag")
-    found = summary(recording)
-    reached, (usual, most) = found["reached_s_per_s"], found["command_age_periods"]["left"].values()
+    usual, most = recording.ages["left"]
     assert verify(recording).holds
     silent = replace(recording, held={"left": recording.held["left"][:5]})
     assert "the bag lacks commands of left that acted, the first at tick" in verify(silent).words
     assert 9.0 <= usual <= most
     assert usual < 1000.0
     assert recording.counts["left/effort_command"] < 1500
-    assert 0.0 < reached <= 2.05
+    assert 0.0 < recording.reached <= 2.05
     assert run.returncode == 1
     assert not re.search("Hz: [^;]*(/diagnostics|timing)", out)  # they go by wall time
     assert f"grasp: --max-age 1: the oldest command was {most:g} periods old" in err
-    assert f"grasp: --min-factor 2.5: {reached:.3g} s per second was reached" in err
-    words = f"{reached:.3g} s per second, {found['overruns']} overruns, "
+    assert f"grasp: --min-factor 2.5: {recording.reached:.3g} s per second was reached" in err
+    words = f"{recording.reached:.3g} s per second, {recording.overruns} overruns, "
     for text in (out, command("inspect", "run/bag").stdout):
         assert words in text
         assert f"left at most {most:.0f} periods, 99 % at most {usual:.0f}" in text
@@ -231,7 +229,7 @@ def test_a_bag_tells_for_how_long_a_command_was_missing(grasp_run: Any, tmp_path
     run = grasp_run(*THREE_SECONDS, "--free-running", "1", "--controller", "left=hangs:law")
     out, err = run.communicate(timeout=DEADLINE)
     assert "no command newer than 0.1 s" in err
-    late = summary(bag.read(tmp_path / "run" / "bag"))["timed_out_periods"]["left"]
+    late = bag.read(tmp_path / "run" / "bag").timed_out["left"]
     assert 300 < late < 2500
     for text in (out, command("inspect", "run/bag").stdout):
         assert re.search(rf"timed out +left for {late} periods, in which its last command was older than", text)
@@ -244,11 +242,10 @@ def test_a_run_that_is_interrupted_tells_the_ages_of_its_end(grasp_run: Any, tmp
     assert any("no command newer than 0.1 s" in line for line in run.stderr)
     run.send_signal(signal.SIGINT)
     _, err = run.communicate(timeout=DEADLINE)
-    found = summary(bag.read(tmp_path / "run" / "bag"))
-    oldest = found["command_age_periods"]["left"]["max"]
-    assert oldest >= 100.0
-    assert found["timed_out_periods"]["left"] > 0
-    assert f"--max-age 90: the oldest command was {oldest:g} periods old" in err
+    recording = bag.read(tmp_path / "run" / "bag")
+    assert recording.ages["left"][1] >= 100.0
+    assert recording.timed_out["left"] > 0
+    assert f"--max-age 90: the oldest command was {recording.ages['left'][1]:g} periods old" in err
     assert run.returncode == 1
 
 

@@ -202,6 +202,22 @@ class Recording(Tabular, Frozen):
                 for name, count in self.counts.items()}
 
     @property
+    def reached(self) -> float:
+        """Simulated seconds per second that a free run has reached, without pauses; NaN if it has not said it."""
+        return float(self.timing["reached"][-1]) if "reached" in self.timing else math.nan
+
+    @property
+    def overruns(self) -> int:
+        """Periods of a free run that were computed later than a whole period."""
+        return int(self.timing["overruns"][-1]) if "overruns" in self.timing else 0
+
+    @property
+    def ages(self) -> dict[str, tuple[float, float]]:
+        """By how many periods the states that commands answer are older: 99th percentile and largest, by side."""
+        return {side: (float(self.timing[f"{side}_age_p99_all"][-1]), float(self.timing[f"{side}_age_max_all"][-1]))
+                for side in SIDES if f"{side}_age_p99_all" in self.timing}
+
+    @property
     def law_known(self) -> np.ndarray:
         """Whether the laws of the controllers were known and ran, by tick (n,)."""
         return np.asarray(self.lyapunov[:, LYAPUNOV_NAMES.index("closed")] == 1.0)
@@ -242,6 +258,12 @@ class Recording(Tabular, Frozen):
     def alarms(self) -> int:
         """Ticks at which the monitor found energy that the held forces do not explain."""
         return int(np.count_nonzero(self.lyapunov[:, LYAPUNOV_NAMES.index("alarm")] > 0.0))
+
+    @property
+    def timed_out(self) -> dict[str, int]:
+        """Periods of a free run in which a side's command was older than its timeout, by side."""
+        return {side: int(self.timing[f"{side}_timed_out_all"][-1])
+                for side in SIDES if f"{side}_timed_out_all" in self.timing}
 
     @property
     def missing(self) -> dict[str, int]:

@@ -12,7 +12,6 @@ from grasp_ros.graph.bag.recorder import LEFT_OUT, SOURCE
 from grasp_ros.graph.bag.recording import Recording, check_recording
 from grasp_ros.graph.bag.verify import Verification
 from grasp_ros.physics.model import Mode
-from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
 
 
@@ -41,13 +40,12 @@ def summary(recording: Recording) -> dict[str, Any]:
     if not running.lockstep:
         found["real_time_factor"] = running.real_time_factor
     if recording.timing:
-        last = {name: float(numbers[-1]) for name, numbers in recording.timing.items()}
-        sides = [side for side in SIDES if f"{side}_timed_out_all" in last]
         found |= {
-            "reached_s_per_s": last["reached"], "overruns": int(last["overruns"]), "given_up_s": last["lost_s"],
-            "command_age_periods": {side: {kind: last[f"{side}_age_{kind}_all"] for kind in ("p99", "max")}
-                                    for side in sides},
-            "timed_out_periods": {side: int(last[f"{side}_timed_out_all"]) for side in sides},
+            "reached_s_per_s": recording.reached, "overruns": recording.overruns,
+            "given_up_s": float(recording.timing["lost_s"][-1]),
+            "command_age_periods": {side: {"p99": usual, "max": most}
+                                    for side, (usual, most) in recording.ages.items()},
+            "timed_out_periods": recording.timed_out,
         }
     return found
 
