@@ -29,6 +29,7 @@ def add_to(commands: Any) -> None:
     sub.add_argument("bag", type=named, help="directory or file of a bag")
     add_json(sub)
     add_file(sub, "FILE.csv", "write states, forces and V as a table; - is the standard output")
+    sub.add_argument("--replay", action="store_true", help="also verify it, as `grasp verify` does")
     add_limits(sub)
     sub = add_command(commands, "verify", _verify)
     sub.add_argument("bag", type=named, help="directory or file of a bag")
@@ -79,18 +80,25 @@ def _recover(options: argparse.Namespace) -> int:
 def _inspect(options: argparse.Namespace) -> int:
     from grasp_ros.cli import report
     from grasp_ros.graph.bag.reading import read
-    from grasp_ros.graph.bag.summary import summary
+    from grasp_ros.graph.bag.summary import summary, verified
+    from grasp_ros.graph.bag.verify import verify
 
     check_output(options.output, (".csv",), options.force, [options.bag])
     recording = read(options.bag)
     check_limits(options, recording.running.lockstep)
     warn(recording.scene)
-    found = summary(recording)
-    show(options, report.table(report.describe_recording(recording, found)), found)
+    found, holds = summary(recording), True
+    rows = report.describe_recording(recording, found)
+    if options.replay:
+        prepare()
+        verification = verify(recording)
+        rows, holds = rows + report.describe_verification(verification), verification.holds
+        found["replay"] = verified(verification)
+    show(options, report.table(rows), found)
     if options.output is not None:
         with destination(options.output) as file:
             recording.to_csv(file)
-    return 0 if keeps(recording, options) else 1
+    return 0 if holds and keeps(recording, options) else 1
 
 
 def _verify(options: argparse.Namespace) -> int:

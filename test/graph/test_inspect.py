@@ -34,9 +34,9 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Trajectory
 
 def test_inspect_says_size_duration_and_rates_in_numbers(recorded: tuple[Path, Trajectory], command: Any) -> None:
     path, run = recorded
-    verified = json.loads(command("verify", str(path), "--json").stdout)
-    assert (verified["holds"], verified["same_without_ROS"], verified["states_compared"]) == (True, True, 501)
-    found = json.loads(command("inspect", str(path), "--json").stdout)
+    found = json.loads(command("inspect", str(path), "--json", "--replay").stdout)
+    replay = found["replay"]
+    assert (replay["holds"], replay["same_without_ROS"], replay["states_compared"]) == (True, True, 501)
     assert found["size_bytes"] == sum(file.stat().st_size for file in path.iterdir())
     assert (found["duration_s"], found["scene_duration_s"], found["ticks"]) == (0.5, 0.5, 501)
     assert found["topics"]["joint_states"] == {"messages": 501, "rate_Hz": 1000.0}
