@@ -21,7 +21,7 @@ from grasp_ros.cli.checks import load_scene, prepare
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
 from grasp_ros.graph.bag import BagError, EmptyBagError
 from grasp_ros.graph.host import check_reach, hold, network
-from grasp_ros.graph.parameters import PEER_SECONDS, quoted
+from grasp_ros.graph.parameters import PEER_SECONDS
 from grasp_ros.graph.processes import Graph, become
 from grasp_ros.graph.running import Running, check_factor
 from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals, on_signals
@@ -110,19 +110,19 @@ def _run(options: argparse.Namespace) -> int:
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
     check_limits(options, lockstep=options.free_running is None)
     Running(options.accuracy)  # refuses what is wrong before anything is there, as those around it do
-    plant = {"paused": str(options.paused).lower()}
+    plant: dict[str, bool | float | str] = {"paused": options.paused, "progress": True}
     if options.free_running is not None:
         check_factor(options.free_running, "--free-running")
-        plant.update(free_running="true", real_time_factor=repr(options.free_running), wait_for_controllers="true")
+        plant.update(free_running=True, real_time_factor=options.free_running, wait_for_controllers=True)
     spent = [(time.monotonic(), "begin")]
     if not kernels_on_disk():  # otherwise the plant alone loads them
         prepare()
         spent.append((time.monotonic(), "compilation"))
     first = not os.path.exists(directory.parent)
     graph = Graph(
-        scene, directory, options.accuracy, progress=True, without=options.without, laws=laws,
-        plant=plant, one_process=options.one_process, namespace=options.namespace,
-        peer_timeout=options.peer_timeout, on_silence=options.on_silence,
+        scene, directory, options.accuracy, without=options.without, laws=laws, plant=plant,
+        one_process=options.one_process, namespace=options.namespace, peer_timeout=options.peer_timeout,
+        on_silence=options.on_silence,
     )
     try:
         stopped = _live(graph, spent)
@@ -222,7 +222,7 @@ def _replay(options: argparse.Namespace) -> int:
     _reach(options)
     held = hold(os.environ, states.removesuffix(f"/{JOINT_STATES.name}") or "/")
     held.set_inheritable(True)  # what this process becomes has it to its end
-    become("player", {"bag": quoted(str(options.bag)), "rate": repr(options.rate)})
+    become("player", {"bag": str(options.bag), "rate": options.rate})
 
 
 def _watch(options: argparse.Namespace) -> int:
@@ -243,4 +243,4 @@ def _watch(options: argparse.Namespace) -> int:
 
 def _ctl(options: argparse.Namespace) -> int:
     _reach(options)
-    become("remote", {"words": quoted(json.dumps(options.words))}, options.namespace)
+    become("remote", {"words": json.dumps(options.words)}, options.namespace)

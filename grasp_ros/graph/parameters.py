@@ -59,11 +59,13 @@ def usage(node: str) -> str:
     return "\n".join([f"usage: {node} [--ros-args [-p NAME:=VALUE] ...]", "", *rows, ""])
 
 
-def quoted(text: str) -> str:
-    """A text as `-p` takes one, in ASCII: as YAML, where JSON would write pairs of surrogates, which YAML refuses."""
-    if re.search("[\ud800-\udfff]", text):
-        raise Refused(f"{text}: not allowed; allowed: a name in UTF-8")
-    return '"' + re.sub(r'[^ !#-\[\]-~]', lambda sign: f"\\U{ord(sign[0]):08x}", text) + '"'
+def argument(value: bool | float | str) -> str:
+    """A value as `-p` takes one, in ASCII: as YAML; JSON would write pairs of surrogates, which YAML refuses."""
+    if not isinstance(value, str):
+        return repr(value).lower()
+    if re.search("[\ud800-\udfff]", value):
+        raise Refused(f"{value}: not allowed; allowed: a name in UTF-8")
+    return '"' + re.sub(r'[^ !#-\[\]-~]', lambda sign: f"\\U{ord(sign[0]):08x}", value) + '"'
 
 
 def check_timeouts(peer: float, start: float) -> None:

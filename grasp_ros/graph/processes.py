@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from grasp_ros.graph.host import hold, remove_left
-from grasp_ros.graph.parameters import PEER_SECONDS, START_SECONDS, check_timeouts, quoted
+from grasp_ros.graph.parameters import PEER_SECONDS, START_SECONDS, argument, check_timeouts
 from grasp_ros.graph.stopping import GRACE_SECONDS, STOP_SIGNALS
 from grasp_ros.physics.errors import Failed, Refused
 from grasp_ros.scene import Scene
@@ -33,19 +33,20 @@ NODES_SECONDS = 0.4
 MONITOR_NICE, PRIORITY = 10, 1  # of Linux: the monitor of a free run may be late, the others may not
 LONGEST = 2**16  # bytes of last words
 NO_MEMORY = " (is /dev/shm full?)"
+Values = Mapping[str, bool | float | str]  # of parameters, by name
 
 
-def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> NoReturn:
-    """Become the process of a node, with parameters as `-p` takes them: signals and exit status are the node's own.
+def become(node: str, parameters: Values, namespace: str = "/") -> NoReturn:
+    """Become the process of a node: signals and exit status are the node's own.
 
     It keeps no log file, which would need a home directory that can be written.
     """
     os.execv(sys.executable, [*_command([node], parameters, namespace), "--disable-external-lib-logs"])
 
 
-def _command(nodes: Sequence[str], parameters: Mapping[str, str], namespace: str) -> list[str]:
+def _command(nodes: Sequence[str], parameters: Values, namespace: str) -> list[str]:
     """Command line of a node, or of "graph" and the nodes of its process; after "child" it ends with this one."""
-    words = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
+    words = [word for key, value in parameters.items() for word in ("-p", f"{key}:={argument(value)}")]
     root = namespace.rstrip("/")
     names = ["-r", f"__ns:={namespace}", "-r", f"/clock:={root}/clock"] if root else []
     # -P: a checkout in the working directory must not take the place of the package that is running.
@@ -59,11 +60,10 @@ class Graph:
     scene: Scene
     directory: Path  # a new one, for the resolved scene and the bag
     accuracy: float
-    progress: bool = False  # whether the plant shows a progress bar on the terminal
     errors: int | None = None  # where the processes' messages go, as in `subprocess.Popen`; None: to the terminal
     without: Sequence[str] = ()  # controllers that somebody else starts
     laws: Mapping[str, str] = field(default_factory=dict)  # of the user's own, "module:object", by controller
-    plant: Mapping[str, str] = field(default_factory=dict)  # further parameters of it
+    plant: Values = field(default_factory=dict)  # further parameters of it
     one_process: bool = False  # whether all nodes run in one process and one thread
     namespace: str = "/"  # of all names, /clock too where it is not the root
     peer_timeout: float = PEER_SECONDS  # wall time without a heartbeat, or an answer, after which a node is silent
@@ -101,7 +101,7 @@ class Graph:
         for name in self.laws.keys() & {*self.without}:
             raise Refused(f"{name}: --controller and --without; allowed: one of the two")
         scene_file = self.directory / f"{self.scene.name}.yaml"
-        settings = self._settings(scene_file)
+        commands = self._commands(self._settings(scene_file))
         self._place = hold(os.environ, self.namespace)
         try:
             with writing(self.directory):
@@ -121,7 +121,7 @@ class Graph:
         self._lifeline, end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._lifeline.setblocking(False)
         try:
-            for name, command in self._commands(settings).items():
+            for name, command in commands.items():
                 self.processes[name] = subprocess.Popen(
                     command, env=environment, start_new_session=True, stdin=end.fileno(), stderr=self.errors
                 )
@@ -131,30 +131,22 @@ class Graph:
             end.close()
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
-    def _settings(self, scene: Path) -> dict[str, dict[str, str]]:
+    def _settings(self, scene: Path) -> dict[str, Values]:
         """Parameters of the nodes, where the file of the scene will be; a law may leave the working directory."""
         patience = 0.0 if self.without else START_SECONDS
         check_timeouts(self.peer_timeout, patience or math.inf)
-        shared = {
-            "on_silence": self.on_silence, "peer_timeout_s": repr(self.peer_timeout), "start_timeout_s": repr(patience)
+        shared: Values = {
+            "on_silence": self.on_silence, "peer_timeout_s": self.peer_timeout, "start_timeout_s": patience
         }
+        monitored = {**shared, "wait_for_monitor": True}
         return {
-            "monitor": {"bag": quoted(str(self.bag.absolute())), **shared},
-            **{
-                name: {**shared, "wait_for_monitor": "true", "law": quoted(self.laws.get(name, ""))}
-                for name in self.scene.controllers if name not in self.without
-            },
-            "plant": {
-                "scene": quoted(str(scene.absolute())),
-                "accuracy": repr(float(self.accuracy)),
-                "wait_for_monitor": "true",
-                "progress": str(self.progress).lower(),
-                **shared,
-                **self.plant,
-            },
+            "monitor": {**shared, "bag": str(self.bag.absolute())},
+            **{name: {**monitored, "law": self.laws.get(name, "")}
+               for name in self.scene.controllers if name not in self.without},
+            "plant": {**monitored, "scene": str(scene.absolute()), "accuracy": float(self.accuracy), **self.plant},
         }
 
-    def _commands(self, settings: Mapping[str, Mapping[str, str]]) -> dict[str, list[str]]:
+    def _commands(self, settings: Mapping[str, Values]) -> dict[str, list[str]]:
         """Command lines by the names of the processes."""
         if not self.one_process:
             return {name: _command(["child", name], numbers, self.namespace) for name, numbers in settings.items()}

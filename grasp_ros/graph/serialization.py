@@ -17,6 +17,7 @@ from grasp_ros.scene.topics import CLOCK, FORCE, FRAME, LYAPUNOV, LYAPUNOV_NAMES
 SHORTEST, MOST_BYTES = 16, 4096  # of a message that comes with every state
 _HEAD = b"\0\1\0\0"  # CDR, little endian; what follows is aligned from its end on
 _STAMP, _LENGTH, _NUMBER = struct.Struct("<iI"), struct.Struct("<I"), struct.Struct("<d")
+Part = tuple[str, tuple[Any, ...]]  # of a message: its format and its values
 _MARK = 1.2345678901234567e-200  # of which nothing else in a message has a multiple
 
 
@@ -25,41 +26,26 @@ def list_message(
     effort: Sequence[float] = (), frame: str = "",
 ) -> bytes:
     """A JointState, serialized: a stamped list of numbers with names."""
-    content = _length(_header(time_ns, frame), names)
-    for name in names:
-        content = _text(content, name)
-    for numbers in (position, velocity, effort):
-        content = _numbers(_length(content, numbers), numbers)
-    return _HEAD + content
+    words = [("I", (len(names),)), *map(_text, names)]
+    lists = [(f"I{len(numbers)}d" if len(numbers) else "I", (len(numbers), *numbers))
+             for numbers in (position, velocity, effort)]
+    return _packed(time_ns, frame, *words, *lists)
 
 
 def force_message(time_ns: int, force: float) -> bytes:
     """A WrenchStamped, serialized: a stamped force along the line in N."""
-    return _HEAD + _numbers(_header(time_ns, FRAME), (force, 0.0, 0.0, 0.0, 0.0, 0.0))
+    return _packed(time_ns, FRAME, ("6d", (force, 0.0, 0.0, 0.0, 0.0, 0.0)))
 
 
-def _header(time_ns: int, frame: str) -> bytes:
-    return _text(_STAMP.pack(*divmod(time_ns, NANOSECONDS)), frame)
+def _packed(time_ns: int, frame: str, *parts: Part) -> bytes:
+    """A stamped message of parts; `struct` aligns them as C does, and so does CDR, from the end of its head on."""
+    parts = (("iI", divmod(time_ns, NANOSECONDS)), _text(frame), *parts)
+    return _HEAD + struct.pack("@" + "".join(form for form, _ in parts), *(each for _, own in parts for each in own))
 
 
-def _text(content: bytes, word: str) -> bytes:
-    """Content of a message with a text behind it."""
+def _text(word: str) -> Part:
     text = word.encode() + b"\0"
-    return _length(content, text) + text
-
-
-def _length(content: bytes, behind: Sequence[Any]) -> bytes:
-    """Content of a message with the length of what comes behind it."""
-    return _aligned(content, _LENGTH) + _LENGTH.pack(len(behind))
-
-
-def _numbers(content: bytes, numbers: Sequence[float]) -> bytes:
-    """Content of a message with some numbers behind it."""
-    return _aligned(content, _NUMBER) + struct.pack(f"<{len(numbers)}d", *numbers) if len(numbers) else content
-
-
-def _aligned(content: bytes, kind: struct.Struct) -> bytes:
-    return content + bytes(-len(content) % kind.size)
+    return f"I{len(text)}s", (len(text), text)
 
 
 class Template:
@@ -118,10 +104,8 @@ def has_raw_stamp(cdr: bytes) -> bool:
 
 def raw_force(cdr: bytes) -> float:
     """Force along the line in N of a serialized WrenchStamped."""
-    (length,) = _LENGTH.unpack_from(cdr, len(_HEAD) + _STAMP.size)
-    begin = _STAMP.size + _LENGTH.size + length  # of the numbers, which are aligned to their size
-    (force,) = _NUMBER.unpack_from(cdr, len(_HEAD) + -(-begin // _NUMBER.size) * _NUMBER.size)
-    return float(force)
+    (length,) = _LENGTH.unpack_from(cdr, len(_HEAD) + _STAMP.size)  # of the frame
+    return float(struct.unpack_from(f"@iII{length}sd", cdr, len(_HEAD))[-1])
 
 
 def raw_command(cdr: bytes) -> tuple[int, float] | None:

@@ -205,7 +205,7 @@ def _step(plant: Plant, action: str, draw: random.Random) -> bool:
 @contextmanager
 def steered(scene: Scene, directory: Path) -> Iterator[Plant]:
     """A graph of real processes in a new directory, paused at its first state; ends it."""
-    graph = Graph(scene, directory, ACCURACY, errors=subprocess.DEVNULL, plant={"paused": "true"})
+    graph = Graph(scene, directory, ACCURACY, errors=subprocess.DEVNULL, plant={"paused": True})
     graph.start()
     try:
         with closing(Plant(graph)) as plant:

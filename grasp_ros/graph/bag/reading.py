@@ -51,23 +51,14 @@ def read(path: str | os.PathLike[str]) -> Recording:
 
 
 def _recording(opened: Opened) -> Recording:
-    scene, reader, changes, timing = opened.scene, Ticks(opened), Changes(opened.scene), list[Sequence[float]]()
-    quality = () if opened.running.lockstep else timing_names(NAMES[body] for body in scene.system.laws)
-    held = {topic: array("d") for topic in opened.held}
+    scene, reader = opened.scene, BagReader(opened)
     counts = Counter(dict.fromkeys(opened.names, 0))
     stamps, rows = array("q"), array("d")
-    for time_ns, tick, others in ticks_of(opened, reader.topics):
+    for time_ns, tick, others in reader.ticks(reader.topics):
         counts.update([*tick, *(topic for topic, _ in others)])
         try:
             for topic, stored in others:
-                if topic in topics.CHANGES.values():
-                    changes.add(topic, stored)
-                elif topic == topics.TIMING:
-                    timing.extend(_timing(quality, stored))
-                elif topic in held:  # a command of a free run, which belongs to no tick
-                    held[topic].append(reader.force(topic, stored))
-                else:
-                    check_own(opened, topic, stored)
+                reader.take(topic, stored)
             row = reader.row(time_ns, tick) if tick else []
         except UNREADABLE as error:
             raise BagError(f"{opened.path}: {error or type(error).__name__}; `grasp recover` leaves it out") from None
@@ -82,13 +73,14 @@ def _recording(opened: Opened) -> Recording:
     ends = np.cumsum([template.count for template in reader.topics.values()])[:-1]
     parts = dict(zip(reader.topics, np.split(np.array(rows).reshape(len(times), -1), ends, axis=1), strict=True))
     state, effort, command = _motion(scene, ticks, parts)
+    timing = zip(reader.quality, np.array(reader.timing).T, strict=True) if reader.timing else ()
     return Recording(
         path=opened.path, scene=scene, versions=opened.versions, running=opened.running, tick=ticks, state=state,
         effort=effort, command=command, outputs={own.topic.name: parts[own.topic][:, 0] for own in scene.outputs},
-        lyapunov=parts[topics.LYAPUNOV], changes=dict(changes), starts=ticks[times[:, 1] == 0],
-        counts={topic.name: count for topic, count in counts.items()}, unheard=dict(+changes.unheard),
-        timing=dict(zip(quality, np.array(timing).T, strict=True)) if timing else {}, lost=_lost(opened.storage),
-        held={side: np.array(held[topic]) for side, topic in topics.COMMANDS.items() if topic in held},
+        lyapunov=parts[topics.LYAPUNOV], changes=reader.changes, starts=ticks[times[:, 1] == 0],
+        counts={topic.name: count for topic, count in counts.items()}, unheard=dict(+reader.unheard),
+        timing=dict(timing), lost=_lost(opened.storage),
+        held={side: np.array(reader.held[topic]) for side, topic in topics.COMMANDS.items() if topic in reader.held},
     )
 
 
@@ -105,55 +97,6 @@ def _motion(scene: scenes.Scene, ticks: np.ndarray, parts: Mapping[Topic, Array]
     return state, effort, command
 
 
-def ticks_of(
-    opened: Opened, wanted: Container[Topic]
-) -> Iterator[tuple[int, dict[Topic, bytes], list[tuple[Topic, Stored]]]]:
-    """Time in ns of each tick, its messages on these topics, and all others of that time, in the order of the bag.
-
-    A topic has one message for a tick; of more the last one is salvaged.
-    """
-    messages = opened.messages if opened.storage.ours else _with_our_times(opened, wanted)
-    for time_ns, group in groupby(messages, key=lambda message: message[1].time_ns):
-        tick, others = dict[Topic, bytes](), list[tuple[Topic, Stored]]()
-        for topic, stored in group:
-            if topic not in wanted:
-                others.append((topic, stored))
-                continue
-            if topic in tick:
-                if not opened.salvage:
-                    raise BagError(f"{stored.topic}: {time_ns} ns: a second message of this tick; allowed: one")
-                opened.left_out[f"messages on {stored.topic} before another one of their tick"] += 1
-            tick[topic] = stored.cdr
-        yield time_ns, tick, others
-
-
-def check_own(opened: Opened, topic: Topic, stored: Stored) -> None:
-    """Refuse a scene, or how it ran, that is not that of the bag's own record."""
-    if topic in (topics.SCENE, topics.RUN):
-        own = opened.storage.records[OWN_RECORD][topic.name]
-        if decode(topic, stored.cdr).data != own:
-            raise BagError(f"{stored.topic}: another {topic.name} than in the bag's own record")
-
-
-def _with_our_times(opened: Opened, wanted: Container[Topic]) -> Iterator[tuple[Topic, Stored]]:
-    """Messages of a bag that another program has written; refused if their times are not the stamps.
-
-    Until a reset, from which on the times of our own bags are ahead of the stamps.
-    """
-    stamp_ns = 0
-    for topic, stored in opened.messages:
-        if topic in wanted and has_raw_stamp(stored.cdr):
-            before_ns, stamp_ns = stamp_ns, raw_stamp_ns(stored.cdr)
-            if stamp_ns < before_ns:
-                yield topic, stored
-                break
-            if stamp_ns != stored.time_ns:
-                raise BagError(f"{opened.path}: {stored.topic}: time {stored.time_ns} ns in the bag, stamp {stamp_ns}"
-                               f" ns: another recorder wrote it; {OUR_TIMES}")
-        yield topic, stored
-    yield from opened.messages
-
-
 def _check_metadata(path: Path, storage: Storage) -> None:
     """Refuse a metadata.yaml that is not the one that was written when the bag was closed."""
     file = path / "metadata.yaml"
@@ -164,14 +107,14 @@ def _check_metadata(path: Path, storage: Storage) -> None:
         raise BagError(f"{file}: was changed; `grasp recover` makes a new bag with metadata of its own")
 
 
-class Ticks:
-    """Reads what comes with every tick, and refuses what no recorder writes.
+class BagReader:
+    """Reads the messages of a bag, and refuses what no recorder writes.
 
     A recorder writes messages that differ from each other in time and numbers alone; any other is decoded as a whole.
     """
 
     def __init__(self, opened: Opened) -> None:
-        scene, self._full = opened.scene, opened.names
+        scene, self._opened, self._full = opened.scene, opened, opened.names
         self._period_ns, self._end_ns = scene.period_ns, scene.ticks * scene.period_ns
         self.names = [NAMES[body] for body in scene.system.present]
         self._templates = {topic: template_of(topic, self.names) for topic in (topics.CLOCK, *scene.topics)}
@@ -179,6 +122,83 @@ class Ticks:
         self.topics = {topic: own for topic, own in self._templates.items() if topic not in opened.held}
         self._time_ns, self.stamp_ns = 0, 0  # of the last tick; the first one counts from the begin of the scene
         self._before = -1
+        # What `take` has taken: forces, numbers of `timing` by `quality`, and those that differ from the ones in force
+        # before, by the tick of the bag from which they act; how many announcements are missing.
+        self.held = {topic: array("d") for topic in opened.held}
+        self.quality = () if opened.running.lockstep else timing_names(NAMES[body] for body in scene.system.laws)
+        self.timing: list[Sequence[float]] = []
+        self.changes: dict[int, dict[str, float]] = {}
+        self._now = scene.numbers_of(*scene.controllers)
+        self._announced = {topic: Numbers() for topic in topics.CHANGES.values()}
+        self.unheard: Counter[str] = Counter()
+
+    def ticks(
+        self, wanted: Container[Topic]
+    ) -> Iterator[tuple[int, dict[Topic, bytes], list[tuple[Topic, Stored]]]]:
+        """Time in ns of each tick, its messages on these topics, and all others of that time, in the order of the bag.
+
+        A topic has one message for a tick; of more the last one is salvaged.
+        """
+        opened = self._opened
+        messages = opened.messages if opened.storage.ours else self._with_our_times(wanted)
+        for time_ns, group in groupby(messages, key=lambda message: message[1].time_ns):
+            tick, others = dict[Topic, bytes](), list[tuple[Topic, Stored]]()
+            for topic, stored in group:
+                if topic not in wanted:
+                    others.append((topic, stored))
+                    continue
+                if topic in tick:
+                    if not opened.salvage:
+                        raise BagError(f"{stored.topic}: {time_ns} ns: a second message of this tick; allowed: one")
+                    opened.left_out[f"messages on {stored.topic} before another one of their tick"] += 1
+                tick[topic] = stored.cdr
+            yield time_ns, tick, others
+
+    def _with_our_times(self, wanted: Container[Topic]) -> Iterator[tuple[Topic, Stored]]:
+        """Messages of a bag that another program has written; refused if their times are not the stamps.
+
+        Until a reset, from which on the times of our own bags are ahead of the stamps.
+        """
+        stamp_ns = 0
+        for topic, stored in self._opened.messages:
+            if topic in wanted and has_raw_stamp(stored.cdr):
+                before_ns, stamp_ns = stamp_ns, raw_stamp_ns(stored.cdr)
+                if stamp_ns < before_ns:
+                    yield topic, stored
+                    break
+                if stamp_ns != stored.time_ns:
+                    raise BagError(f"{self._opened.path}: {stored.topic}: time {stored.time_ns} ns in the bag, stamp"
+                                   f" {stamp_ns} ns: another recorder wrote it; {OUR_TIMES}")
+            yield topic, stored
+        yield from self._opened.messages
+
+    def take(self, topic: Topic, stored: Stored) -> None:
+        """Take a message that comes beside the ticks: an announcement, a command of a free run, how that went."""
+        if topic in self._announced:
+            self._change(topic, stored)
+        elif topic == topics.TIMING:
+            self.timing.extend(_timing(self.quality, stored))
+        elif topic in self.held:
+            force = self.numbers(topic, stored.cdr)[-1]
+            if not abs(force) <= LARGEST:
+                raise BagError(f"{stored.topic}: {NOT_FINITE}")
+            self.held[topic].append(force)
+        elif topic in (topics.SCENE, topics.RUN) and (
+            decode(topic, stored.cdr).data != self._opened.storage.records[OWN_RECORD][topic.name]
+        ):
+            raise BagError(f"{stored.topic}: another {topic.name} than in the bag's own record")
+
+    def _change(self, topic: Topic, stored: Stored) -> None:
+        message, tick = decode(topic, stored.cdr), stored.time_ns // self._period_ns
+        if len(message.name) != len(message.position):
+            raise BagError(f"{stored.topic}: tick {tick}: {len(message.name)} names of {len(message.position)} numbers")
+        numbers = dict(zip(message.name, message.position.tolist(), strict=True))
+        self.unheard[topic.name] += self._announced[topic].take(message)
+        if not numbers.keys() <= self._now.keys():
+            raise BagError(f"{stored.topic}: {numbers} at tick {tick}; allowed: {', '.join(self._now)}")
+        if new := {name: number for name, number in numbers.items() if self._now[name] != number}:
+            self.changes.setdefault(tick, {}).update(new)
+            self._now.update(new)
 
     def row(self, time_ns: int, tick: Mapping[Topic, bytes]) -> list[float]:
         """Numbers of the messages of a tick, NaN where one is missing.
@@ -222,13 +242,6 @@ class Ticks:
         """Seconds, nanoseconds and numbers of a message."""
         return self._templates[topic].read(cdr) or self._decoded(topic, cdr)
 
-    def force(self, topic: Topic, stored: Stored) -> float:
-        """Force of a command of a free run."""
-        force = self.numbers(topic, stored.cdr)[-1]
-        if not abs(force) <= LARGEST:
-            raise BagError(f"{stored.topic}: {NOT_FINITE}")
-        return force
-
     def _decoded(self, topic: Topic, cdr: bytes) -> list[float]:
         """Time and numbers of a message of another program, in the order of those of a recorder."""
         message, names, name = decode(topic, cdr), self.names, self._full[topic]
@@ -252,29 +265,6 @@ class Ticks:
                 raise BagError(f"{name}: {', '.join(message.name)}; allowed: {', '.join(topics.LYAPUNOV_NAMES)}")
             numbers = [numbers[message.name.index(name)] for name in topics.LYAPUNOV_NAMES]
         return [message.header.stamp.sec, message.header.stamp.nanosec, *numbers]
-
-
-class Changes(dict[int, dict[str, float]]):
-    """Numbers that differ from those in force before, by the tick of the bag from which they act."""
-
-    def __init__(self, scene: scenes.Scene) -> None:
-        self._period_ns = scene.period_ns
-        self._now = {name: number for node in scene.controllers for name, number in scene.numbers_of(node).items()}
-        self._numbers = {topic: Numbers() for topic in topics.CHANGES.values()}
-        self.unheard: Counter[str] = Counter()
-
-    def add(self, topic: Topic, stored: Stored) -> None:
-        """Take an announcement."""
-        message, tick = decode(topic, stored.cdr), stored.time_ns // self._period_ns
-        if len(message.name) != len(message.position):
-            raise BagError(f"{stored.topic}: tick {tick}: {len(message.name)} names of {len(message.position)} numbers")
-        numbers = dict(zip(message.name, message.position.tolist(), strict=True))
-        self.unheard[topic.name] += self._numbers[topic].take(message)
-        if not numbers.keys() <= self._now.keys():
-            raise BagError(f"{stored.topic}: {numbers} at tick {tick}; allowed: {', '.join(self._now)}")
-        if new := {name: number for name, number in numbers.items() if self._now[name] != number}:
-            self.setdefault(tick, {}).update(new)
-            self._now.update(new)
 
 
 def _timing(names: Sequence[str], stored: Stored) -> Iterator[Sequence[float]]:

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 from grasp_ros.graph.bag import BagError
 from grasp_ros.graph.bag.opening import UNREADABLE, Opened
-from grasp_ros.graph.bag.reading import Changes, Ticks, check_own, ticks_of
+from grasp_ros.graph.bag.reading import BagReader
 from grasp_ros.graph.bag.recorder import LEFT_OUT, SOURCE, Recorder
 from grasp_ros.physics.errors import printable
-from grasp_ros.scene.topics import CHANGES, CLOCK, RUN, SCENE
+from grasp_ros.scene.topics import CLOCK, RUN, SCENE
 
 MOST_REASONS = 20  # that are listed
 TICK = re.compile(r"\b(tick \d+: |\d+ ns; )")  # which is noted beside the reason
@@ -35,7 +35,7 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
         If nothing can be saved, or if the new bag cannot be written.
     """
     opened, refused, written = Opened(path, salvage=True), dict[str, list[int]](), 0
-    scene, reader, changes, recorder = opened.scene, Ticks(opened), Changes(opened.scene), None
+    scene, reader, recorder = opened.scene, BagReader(opened), None
     wanted = {*reader.topics} - {CLOCK}
 
     def note(error: Exception, tick: int) -> None:
@@ -44,7 +44,7 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
         refused.setdefault(why if len(refused) < MOST_REASONS else "other reasons", []).append(tick)
 
     try:
-        for time_ns, tick, others in ticks_of(opened, wanted):
+        for time_ns, tick, others in reader.ticks(wanted):
             number = time_ns // scene.period_ns
             try:
                 if missing := sorted(topic.name for topic in wanted - tick.keys()):
@@ -58,11 +58,7 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
             written += 1
             for topic, stored in others:
                 try:
-                    check_own(opened, topic, stored)
-                    if topic in CHANGES.values():
-                        changes.add(topic, stored)
-                    elif topic in opened.held:
-                        reader.force(topic, stored)
+                    reader.take(topic, stored)
                 except UNREADABLE as error:
                     note(error, number)
                     continue

@@ -81,13 +81,12 @@ class Storage:
         offset = len(MAGIC)
         while offset < len(data):
             try:
-                end = self._end_of(offset)
-                opcode, body = data[offset], data[offset + HEAD.size : end]
-                if opcode == Opcode.DATA_END:
-                    self._check_end(offset, end)
-                    return
-                yield from self._read(opcode, body)
-                offset = end
+                for opcode, body, end in records(data, offset):
+                    if opcode == Opcode.DATA_END:
+                        self._check_end(offset, end)
+                        return
+                    yield from self._read(opcode, body)
+                    offset = end
             except DAMAGE as error:
                 if isinstance(error, UnsupportedFormatError) and not self._salvage:
                     raise BagError(f"{self.path}: {error}, {CONVERT}") from None
@@ -107,17 +106,6 @@ class Storage:
             self._refuse("its last bytes are not the end of an MCAP file")
         if end != offset + DATA_END_BYTES:
             self._refuse("the end of its data is not as long as it should be")
-
-    def _end_of(self, offset: int) -> int:
-        """Where a record ends, if it is all there."""
-        begin = end = offset + HEAD.size
-        if begin <= len(self._data):
-            end += HEAD.unpack_from(self._data, offset)[1]
-        if end > len(self._data):
-            raise EOFError("the rest of a record is missing")
-        if (length := end - begin) > RECORD_BYTES:
-            raise UnsupportedFormatError(f"a record of {length} bytes; allowed: at most {RECORD_BYTES}")
-        return end
 
     def _read(self, opcode: int, body: bytes) -> Iterator[Stored]:
         stream = ReadDataStream(BytesIO(body))
@@ -144,12 +132,8 @@ class Storage:
 
     def _messages(self, data: bytes) -> Iterator[Stored]:
         """Messages of the content of a chunk."""
-        offset, found = 0, []
-        while offset < len(data):
-            opcode, length = HEAD.unpack_from(data, offset)
-            body = data[offset + HEAD.size : offset + HEAD.size + length]
-            if len(body) != length:
-                raise McapError("a record does not fit into its chunk")
+        found = []
+        for opcode, body, _ in records(data):
             if opcode == Opcode.MESSAGE:
                 number, time_ns = MESSAGE.unpack_from(body)
                 channel = self._channels.get(number)
@@ -159,7 +143,6 @@ class Storage:
                 found.append(Stored(channel.topic, schema.name, time_ns, body[MESSAGE.size :]))
             elif not self._defines(opcode, body):
                 raise McapError(f"record {opcode} is not one of a chunk")
-            offset += HEAD.size + length
         yield from found
 
     def _defines(self, opcode: int, body: bytes) -> bool:
@@ -180,10 +163,8 @@ class Storage:
             summary = memoryview(self._data)[offset : -len(MAGIC) - SUM.size]
             if not offset or (footer.summary_crc and zlib.crc32(summary) != footer.summary_crc):
                 return
-            while True:  # to the end of the file
-                end = self._end_of(offset)
-                self._defines(self._data[offset], self._data[offset + HEAD.size : end])
-                offset = end
+            for opcode, body, _ in records(self._data, offset):
+                self._defines(opcode, body)
 
     def _footer(self) -> Footer:
         footer: Footer = Footer.read(ReadDataStream(BytesIO(self._data[HEAD.size - FOOTER_BYTES : -len(MAGIC)])))
@@ -203,9 +184,9 @@ class Storage:
         while (mark := self._data.find(CHUNK_MARK, offset + CHUNK_MARK_AT)) >= 0:
             offset = mark - CHUNK_MARK_AT
             with suppress(*DAMAGE):
-                end = self._end_of(offset)
-                if self._data[offset] == Opcode.CHUNK:
-                    unpack(self._data[offset + HEAD.size : end])
+                opcode, body, _ = next(records(self._data, offset))
+                if opcode == Opcode.CHUNK:
+                    unpack(body)
                     return offset
             offset += 1
         return None
@@ -224,6 +205,20 @@ class Storage:
 
     def _refuse(self, why: str) -> NoReturn:
         raise BagError(f"{self.path}: damaged: {why}; `grasp recover` makes a new bag of what is whole")
+
+
+def records(data: bytes | mmap.mmap, offset: int = 0) -> Iterator[tuple[int, bytes, int]]:
+    """Opcode, content and end of each record from an offset on, as long as it is all there."""
+    while offset < len(data):
+        begin = end = offset + HEAD.size
+        if begin <= len(data):
+            end += HEAD.unpack_from(data, offset)[1]
+        if end > len(data):
+            raise EOFError("the rest of a record is missing")
+        if (length := end - begin) > RECORD_BYTES:
+            raise UnsupportedFormatError(f"a record of {length} bytes; allowed: at most {RECORD_BYTES}")
+        yield data[offset], data[begin:end], end
+        offset = end
 
 
 def unpack(body: bytes) -> bytes:

@@ -230,7 +230,7 @@ def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[
         if (topic := CONTACTS[side].name) in recording.outputs:
             force = impact_force(Contact(*system.pairs[SIDES[side]]), u, d)
             yield (topic, "force", recording.outputs[topic][rows], force)
-    external = system.external_over(np.arange(len(rows))) if system.external else np.zeros((len(rows), 3))
+    external = system.external_over(np.arange(len(rows)))
     for name, body in BODIES.items():
         if (topic := EXTERNAL_FORCES[name].name) in recording.outputs:
             yield (topic, "force", recording.outputs[topic][rows], external[:, body])
@@ -241,7 +241,7 @@ def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[
 def _lyapunov(recording: Recording, rows: np.ndarray, states: Array, external: Array) -> list[Array]:
     """What the monitor has computed, by LYAPUNOV_NAMES; `closed` is what it knew, so that only 0 and 1 are compared."""
     system = recording.scene.system
-    closed = recording.lyapunov[rows, LYAPUNOV_NAMES.index("closed")] == 1.0
+    closed = recording.law_known[rows]
     V, parts = np.full((3, len(rows)), np.nan), recording.parts
     if recording.unheard:  # of numbers that nobody knows: what the monitor says stands
         V, parts = recording.lyapunov[rows, :3].T, []

@@ -18,7 +18,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.topics import COMMANDS, WINDOW, Numbers
+from grasp_ros.scene.topics import CHANGES, COMMANDS, WINDOW, Numbers, Topic
 
 MOST_WAITING = WINDOW + 100  # announcements of a controller: it makes at most one for a command
 MOST_BYTES = 2**16  # of a message beside the states
@@ -76,11 +76,10 @@ class LyapunovMonitor:
         """Whether a law begins to act at a time."""
         return any(self._is_due(side, time_ns) for side in self._waiting)
 
-    def begin(self, time_ns: int) -> list[tuple[str, bytes]]:
-        """Let the laws act that were announced up to a time.
+    def begin(self, time_ns: int) -> list[tuple[Topic, bytes]]:
+        """Let the laws act that were announced up to a time; returns their announcements.
 
-        Their times ascend; one that does not was announced after a reset that is still to come. Returns their sides and
-        messages.
+        Their times ascend; one that does not was announced after a reset that is still to come.
         """
         begun = []
         for side, waiting in self._waiting.items():
@@ -88,7 +87,7 @@ class LyapunovMonitor:
                 self._acting[side], numbers, cdr = waiting.popleft()
                 if numbers != self._scene.numbers_of(f"{side}_controller"):
                     self._scene = self._scene.changed(numbers)
-                begun.append((side, cdr))
+                begun.append((CHANGES[side], cdr))
         return begun
 
     def evaluate(self, ticks: Sequence[Tick]) -> list[list[float]]:

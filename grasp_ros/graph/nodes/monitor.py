@@ -209,9 +209,8 @@ class Monitor(PeerNode):
         self.count("restored commands", tick.restored)
         self.count("lost messages", tick.lost)
         self.count("messages without a state", tick.dropped)
-        beside = [*self._early, *((topics.CHANGES[side], cdr) for side, cdr in self._lyapunov.begin(tick.time_ns))]
+        self._due.append((self._bag_ns, tick, [*self._early, *self._lyapunov.begin(tick.time_ns)]))
         self._early.clear()
-        self._due.append((self._bag_ns, tick, beside))
         if len(self._due) >= MOST_TICKS or tick.time_ns == self._synchronizer.end_ns:
             self._complete()
         else:
@@ -235,8 +234,7 @@ class Monitor(PeerNode):
         self._soon.cancel()
         if self._lyapunov.unknown:  # what was announced while they waited
             self.take_waiting(self._laws)
-        late = self._lyapunov.begin(due[0][1].time_ns)
-        due[0][2].extend((topics.CHANGES[side], cdr) for side, cdr in late)
+        due[0][2].extend(self._lyapunov.begin(due[0][1].time_ns))
         rows = self._lyapunov.evaluate([tick for _, tick, _ in due])
         for (bag_ns, tick, beside), values in zip(due, rows, strict=True):
             self.count("ticks")

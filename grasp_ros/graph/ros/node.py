@@ -68,8 +68,8 @@ class GraspNode(ParameterNode):
         self.concern = ""  # what is not as it should be, although the node goes on
         self.trouble = ""  # what keeps it from going on
         self.phase = Phase.WAITING
-        # What it does or waits for: the message of its /diagnostics.
-        self.words = f"waiting for peers {place(os.environ, self.get_namespace())}"
+        self.where = place(os.environ, self.get_namespace())  # it looks for others
+        self.words = f"waiting for peers {self.where}"  # what it does or waits for: the message of its /diagnostics
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._diagnostics = self.publisher(DIAGNOSTICS)
         self.wall_timer(REPORT_SECONDS, self.report)

@@ -21,7 +21,6 @@ from rclpy.qos import DurabilityPolicy
 from rclpy.serialization import serialize_message
 from std_srvs.srv import Trigger
 
-from grasp_ros.graph.host import place
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.graph.ros.parameter_node import refusing
@@ -198,8 +197,7 @@ class Remote(GraspNode):
         if name not in self._known:
             self._known[name] = self.create_client(kind, name)
         client = self._known[name]
-        nobody = f"no {name.rpartition('/')[0]} answers {place(os.environ, self.get_namespace())}"
-        self._wait(client.service_is_ready, nobody)
+        self._wait(client.service_is_ready, f"no {name.rpartition('/')[0]} answers {self.where}")
         future = client.call_async(request)
         self._wait(future.done, f"{name}: is there, and has not answered in {PATIENCE_SECONDS:g} s")
         return future.result()

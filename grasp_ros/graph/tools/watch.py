@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import time
 from collections import defaultdict
 from collections.abc import Callable
@@ -23,7 +22,6 @@ from std_srvs.srv import Trigger
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
-from grasp_ros.graph.host import place
 from grasp_ros.graph.lockstep.steering import PAUSED
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
@@ -52,9 +50,7 @@ class Watch(GraspNode):
         self._found: dict[Topic, bytes] = {}  # those of the newest state of which all have come
         self._state, self._stale = -1, 0.0  # stamp of the last one, and until when nothing later than it is taken
         self._there, self._before, self._rate = time.monotonic(), (time.monotonic(), 0), 0.0  # a plant, at the latest
-        where = place(os.environ, self.get_namespace())
-        self._nobody = f"no plant has come for {PATIENCE_SECONDS:g} s {where}"
-        self._waiting = f"waiting for a plant {where}"
+        self._waiting = f"waiting for a plant {self.where}"
         self._live = Live(self._waiting, auto_refresh=False)
         self._live.start(refresh=True)
         self.subscribe(SCENE, self._on_scene)
@@ -155,7 +151,7 @@ class Watch(GraspNode):
                 moment = self._moment(self._found, alone)
                 self._live.update(self._view.draw(moment, self._live.console.width), refresh=True)
         elif alone and time.monotonic() > self._there + PATIENCE_SECONDS:
-            self.fail(self._nobody)
+            self.fail(f"no plant has come for {PATIENCE_SECONDS:g} s {self.where}")
         else:  # why nothing is seen yet: a paused plant publishes nothing
             state, tick = self._reported or ("", 0)
             hint = "; → steps it, Space lets it go on" if state == PAUSED and self._keys.there else ""
