@@ -8,7 +8,7 @@ import numpy as np
 
 from grasp_ros.exact.driver.callback import Observer
 from grasp_ros.exact.integrator import Integrator
-from grasp_ros.physics.control import normals_over
+from grasp_ros.physics.control import normals_of
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.directions import Directions
@@ -50,12 +50,9 @@ class Carrier(Observer):
         if sampled or system.external:
             tangents.counts[Count.DRIVEN], tangents.numbers[Number.PERIOD] = 1, scene.time_of(1)
         if sampled:
-            normals = np.zeros((scene.ticks + 1, 2, 2))
-            for side, law in system.laws.items():
-                if law.seed is not None:
-                    normals[:, side] = normals_over(law.seed, 0, scene.ticks + 1)
-            tangents = tangents._replace(control=system.law_rows, control_rates=directions.laws, normals=normals,
-                                         waiting=np.zeros((system.delay, 2, n)))
+            tangents = tangents._replace(
+                control=system.law_rows, control_rates=directions.laws, waiting=np.zeros((system.delay, 2, n)),
+                normals=normals_of(system.laws, 0, scene.ticks + 1))
         super().__init__(propagate, tangents)
         self.x, self.out, self.forces = tangents.x[:, :n], tangents.out, tangents.forces
         integrator.observer = self
