@@ -164,17 +164,9 @@ def run_rows(move: Any, driven: tuple[Any, ...], rows: Rows, room: Room, memory:
 
 
 def integrate_rows(rows: Rows, duration: float, wanted: Wanted, limits: Limits) -> None:
-    """Integrate rows of one length under continuous feedback.
+    """Integrate rows of one length, a duration in s, under continuous feedback; they are updated in place.
 
-    Parameters
-    ----------
-    rows : Rows
-        Updated in place.
-    duration, wanted
-        As for an `Integrator` and `observer.watch`.
-    limits : Limits
-        Budgets of each row; what takes longer than `BREATH` is left to `Integrator`, too. Another thread may set
-        `stop`, to have the rows stop.
+    What takes longer than `BREATH` is left to `Integrator`, too. Another thread may set `Limits.stop`.
     """
     run = new_run()
     run_observer = RunObserver(*run[2:], wanted)

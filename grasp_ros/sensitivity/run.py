@@ -17,29 +17,12 @@ from grasp_ros.sensitivity.tangents import Count, Number, tangents_of
 
 
 class Carrier(Observer):
-    """Carries the tangents of one run along, as the observer of its integrator.
+    """Carries the tangents of one run, which has not begun, along as the observer of its integrator.
 
-    Parameters
-    ----------
-    scene : Scene
-    integrator : Integrator
-        Of its run, which has not begun.
-    directions : Directions
-    times : array (m,), s
-        Output times, in any order.
-    sampled : bool
-        Whether commands are held.
-    e : int
-        How many of the output times, the last ones, are times of events.
-
-    Attributes
-    ----------
-    x : array (6, n)
-        Derivatives of the state now.
-    out : array (m, 6, n)
-        At the output times.
-    forces : array (e, 3, 2 + n)
-        At events, of each body: its mass in kg, infinite while it sticks, the constant force on it in N, and its rates.
+    `times` (m,) are output times in s, in any order, the last e of them those of events; `sampled`: commands are held.
+    `x` (6, n) has the derivatives of the state now, `out` (m, 6, n) those at the output times. `forces` (e, 3, 2 + n)
+    has of each body, at the events, its mass in kg, infinite while it sticks, the constant force on it in N, and its
+    derivatives.
     """
 
     def __init__(self, scene: Scene, integrator: Integrator, directions: Directions, times: Array, sampled: bool,
