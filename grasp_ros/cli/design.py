@@ -10,7 +10,7 @@ import numpy as np
 
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_file, add_json, add_scene, named, whole
 from grasp_ros.cli.checks import check_output, load_scene, prepare
-from grasp_ros.cli.output import bar, figure_endings, show, write_figure, write_scene
+from grasp_ros.cli.output import bar, figure_endings, show, write_figure, write_text
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import YAML
 from grasp_ros.simulation.outcomes import GROUPS
@@ -63,7 +63,7 @@ def _design(options: argparse.Namespace) -> int:
         "scene": scene.name, "units": problem.units, "choices": [
             {"numbers": own.numbers, "outcomes": own.outcomes, "runs": own.runs} for own in found]})
     if options.output is not None:
-        write_scene(found[0].scene, options.output)
+        write_text(found[0].scene.to_yaml(), options.output)
     if options.figure is not None:
         from grasp_ros.optimization import figure
 

@@ -8,7 +8,7 @@ from typing import Any
 from grasp_ros import scene as scenes
 from grasp_ros.cli.arguments import add_command, add_file, add_json, add_settings, complete_scenes, named
 from grasp_ros.cli.checks import check_output, load_scene, prepare, warn
-from grasp_ros.cli.output import figure_endings, show, write_figure, write_scene
+from grasp_ros.cli.output import figure_endings, show, write_figure, write_text
 from grasp_ros.identification.fit import fit
 from grasp_ros.identification.measured import CHANNELS, measured
 from grasp_ros.physics.errors import Refused, printable
@@ -66,7 +66,7 @@ def _fit(options: argparse.Namespace) -> int:
         "against": {key: {**test._asdict(), "rejected": test.rejected} for key, test in found.against.items()},
     })
     if options.output is not None and options.output.suffix.lower() in YAML:
-        write_scene(found.scene, options.output)
+        write_text(found.scene.to_yaml(), options.output)
     elif options.output is not None:
         from grasp_ros.identification.figure import measured_and_fitted
 

@@ -20,7 +20,6 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import replacing
 
 if TYPE_CHECKING:
-    from grasp_ros.scene import Scene
     from grasp_ros.simulation.progress import Callback
 
 STDOUT = Path("-")
@@ -85,10 +84,10 @@ def destination(path: Path) -> Iterator[BinaryIO]:
     sys.stdout.buffer.flush()
 
 
-def write_scene(scene: Scene, path: Path) -> None:
-    """A scene into the file of `-o`, as YAML."""
+def write_text(text: str, path: Path) -> None:
+    """A text into the file of `-o`."""
     with destination(path) as file:
-        file.write(scene.to_yaml().encode())
+        file.write(text.encode())
 
 
 def figure_endings(output: Path | None) -> list[str]:

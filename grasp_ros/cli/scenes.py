@@ -9,7 +9,7 @@ from typing import Any
 from grasp_ros import scene as scenes
 from grasp_ros.cli.arguments import add_command, add_force, add_json, add_settings, complete_scenes
 from grasp_ros.cli.checks import check_output, load_scene
-from grasp_ros.cli.output import destination, show
+from grasp_ros.cli.output import show, write_text
 from grasp_ros.scene.commented import commented
 from grasp_ros.scene.files import YAML
 from grasp_ros.scene.scene import text_of
@@ -48,7 +48,5 @@ def _scenes(options: argparse.Namespace) -> int:
 
 def _new(options: argparse.Namespace) -> int:
     check_output(options.file, YAML, options.force)
-    text = commented(load_scene(options.like, options.settings))
-    with destination(options.file) as file:
-        file.write(text.encode())
+    write_text(commented(load_scene(options.like, options.settings)), options.file)
     return 0

@@ -29,6 +29,7 @@ from grasp_ros.physics.layout import Entry, Filled, Of, Outcome, Pair, Place, Tr
 class Rows(NamedTuple):
     """Plants of n rows, and what becomes of them."""
 
+    which: Integers  # (k,) rows that are to be integrated
     loop: Array  # (n, 3, 4) bodies with the feedback
     own: Array  # (n, 3, 4) by themselves
     gains: Array  # (n, 2, 2)
@@ -145,7 +146,7 @@ def go_on(move: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, me
 @door
 def run_rows(move: Any, driven: tuple[Any, ...], rows: Rows, room: Room, memory: Memory, limits: Limits) -> None:
     """Integrate the rows, or fewer if `limits.stop` is set meanwhile."""
-    for i in range(rows.state.shape[0]):
+    for i in rows.which:
         if limits.stop[0] != 0:
             break
         load_row(rows, i, room, memory)
@@ -163,17 +164,9 @@ def run_rows(move: Any, driven: tuple[Any, ...], rows: Rows, room: Room, memory:
 
 
 def integrate_rows(rows: Rows, duration: float, wanted: Wanted, limits: Limits) -> None:
-    """Integrate rows of one length under continuous feedback.
+    """Integrate rows of one length, a duration in s, under continuous feedback; they are updated in place.
 
-    Parameters
-    ----------
-    rows : Rows
-        Updated in place.
-    duration, wanted
-        As for an `Integrator` and `observer.watch`.
-    limits : Limits
-        Budgets of each row; what takes longer than `BREATH` is left to `Integrator`, too. Another thread may set
-        `stop`, to have the rows stop.
+    What takes longer than `BREATH` is left to `Integrator`, too. Another thread may set `Limits.stop`.
     """
     run = new_run()
     run_observer = RunObserver(*run[2:], wanted)

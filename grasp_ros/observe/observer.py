@@ -100,20 +100,10 @@ def observe(address: int, kind: int, t: float, s: float, unit: float, degree: in
 
 
 class RunObserver(Observer):
-    """Watches the runs that use the arrays of one plant and one state, one run after the other.
+    """Watches the runs that use the arrays of one plant and one state, which stay where they are, one after the other.
 
-    Parameters
-    ----------
-    plant, state : Plant and State
-        Of the runs; their arrays stay where they are.
-    wanted : Wanted
-
-    Attributes
-    ----------
-    memory : Memory
-        `loop`, `own`, `base`, `gains` and the switch CERTAIN are to be filled before a run.
-    seen : array, see `record.Seen`
-        What is remembered.
+    Of `memory` the arrays `loop`, `own`, `base`, `gains` and the switch CERTAIN are to be filled before a run. `seen`
+    is what is remembered, see `record.Seen`.
     """
 
     TABLES = "c", "size"

@@ -8,7 +8,7 @@ do nothing. `exact.driver.intervals` compiles the same source for the kernels.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import IntEnum
 from functools import lru_cache
 from typing import Any
@@ -93,13 +93,6 @@ def normals(seed: int, side: int, block: int) -> Array:
     return np.random.default_rng([seed, side, block]).standard_normal((BLOCK, 2))
 
 
-def normals_over(seed: tuple[int, int], first: int, count: int) -> Array:
-    """Standard normal numbers (count, 2) of the ticks from the first on; seed and side."""
-    blocks = range(first // BLOCK, (first + count - 1) // BLOCK + 1)
-    drawn = np.concatenate([normals(*seed, block) for block in blocks])
-    return drawn[first % BLOCK :][:count]
-
-
 class ControlLaw:
     """Linear state feedback around a set-point, with the sensor and the actuator of its arm.
 
@@ -126,3 +119,12 @@ class ControlLaw:
         if any(row[Column.POSITION_NOISE : Column.LIMIT]):
             x, v = measured(row, self.noise(tick).tolist(), x, v)
         return limited(row, feedback(row, x, v))
+
+
+def normals_of(laws: Mapping[int, ControlLaw], first: int, count: int) -> Array:
+    """Standard normal numbers (2, count, 2) of the ticks from the first on, by side; 0 without noise."""
+    found, blocks = np.zeros((2, count, 2)), range(first // BLOCK, (first + count - 1) // BLOCK + 1)
+    for side, law in laws.items():
+        if law.seed is not None:
+            found[side] = np.concatenate([normals(*law.seed, block) for block in blocks])[first % BLOCK :][:count]
+    return found

@@ -6,13 +6,12 @@ are the potential k (x - f/k)^2. V_c is known up to a constant where a body has 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.physics import given
-from grasp_ros.physics.body_energy import body_energy
 from grasp_ros.physics.impact_law import stored_energy
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, Law, Of
 from grasp_ros.physics.model import Array, Contact, hertzian_force, in_contact, penetration
@@ -135,6 +134,18 @@ def energy_balance(system: System, before: Array, after: Array, forces: Array) -
         work = work + 2.0 * forces[..., body] * (after[..., COLUMN[body]] - before[..., COLUMN[body]])
         rounding = rounding + ROUNDING * np.abs(forces[..., body]) * _place(system, body, after)
     return EnergyBalance(levels[1] - levels[0], work, rounding)
+
+
+def body_energy(mass: Any, stiffness: Any, force: Any, x: Any, v: Any, place: Any) -> Any:
+    """m v^2 + k x^2 - 2 f x in J of V, which is twice the energy, and the sum of the sizes of its terms, of roundings.
+
+    k (x - f/k)^2 differs by the constant f^2/k only, which may be far larger. `place` in m is the scale of the rounding
+    of x: |x| + |x_o| for an arm in contact, whose position follows from that of the object, also where x = 0. Of floats
+    or arrays: `exact.driver.energy_check` compiles the same source for every segment.
+    """
+    kinetic = mass * v * v
+    size = kinetic + (stiffness * (abs(x) + EPS * place) + 2.0 * abs(force)) * place
+    return kinetic + stiffness * x * x - 2.0 * force * x, size
 
 
 def mechanical_levels(bodies: Array, body: int, state: Array) -> tuple[Array, Array]:

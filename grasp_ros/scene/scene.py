@@ -139,8 +139,8 @@ class Scene(Frozen):
         """Why V_c may not prove that a run settles."""
         return self.certificate_in_words(sampled) if self.caveats(sampled) else "a mass need not return to 0"
 
-    def time_of(self, tick: int) -> float:
-        """Time of a tick in s: an integer number of ns, rounded once."""
+    def time_of(self, tick: Any) -> Any:
+        """Time of a tick, or of an array of ticks, in s: an integer number of ns, rounded once."""
         return tick * self.period_ns / NANOSECONDS
 
     def feedback_in_words(self, sampled: bool, by_user: bool = False) -> str:

@@ -52,21 +52,7 @@ class Directions(NamedTuple):
 
 
 def directions(scene: Scene, keys: Sequence[str], sampled: bool) -> Directions:
-    """How numbers of a scene change it.
-
-    Parameters
-    ----------
-    scene : Scene
-    keys : sequence of str
-        "section.key": initial values, and every number that enters smoothly.
-    sampled : bool
-        Whether commands are held.
-
-    Raises
-    ------
-    Refused
-        See `check_keys`.
-    """
+    """How numbers of a scene, by "section.key", change it; `sampled`: commands are held. Refused: see `check_keys`."""
     parameters = check_keys(scene, keys, sampled)
     forced = {force.section for force in scene.system.external} & {key.partition(".")[0] for key in keys}
     found = no_directions(len(keys), scene.ticks if forced else 0)
@@ -90,10 +76,7 @@ def no_directions(n: int, ticks: int = 0) -> Directions:
 def check_keys(scene: Scene, keys: Sequence[str], sampled: bool) -> list[Parameter]:
     """The numbers behind some keys, by which a run of a scene has derivatives.
 
-    Raises
-    ------
-    Refused
-        If a key is not in the scene, the motion does not depend smoothly on it, or a sensor quantises.
+    Refused: a key that is not in the scene or on which the motion does not depend smoothly, a sensor that quantises.
     """
     if not keys:
         raise Refused(f"{scene.name}: sensitivity: nothing; allowed: keys of the scene, such as object.position_m")
@@ -110,13 +93,7 @@ def check_keys(scene: Scene, keys: Sequence[str], sampled: bool) -> list[Paramet
 
 
 def check_key(scene: Scene, key: str) -> Parameter:
-    """The number behind a key.
-
-    Raises
-    ------
-    Refused
-        If the scene does not name it, or it does not enter smoothly.
-    """
+    """The number behind a key; one that the scene does not name, or that does not enter smoothly, is refused."""
     parameter = parameter_of(scene, key)
     if parameter.unit in NOT_SMOOTH or parameter.whole:
         raise Refused(f"{scene.name}: {key} has no derivative: {NOT_SMOOTH.get(parameter.unit, 'it is whole')}")

@@ -26,17 +26,9 @@ class Moments(NamedTuple):
 
 
 def event_rates(scene: Scene, changes: Directions, sampled: bool, events: Array, moments: Moments) -> Array:
-    """Derivatives (e, n) of the times of events, in s by the unit of a direction.
+    """Derivatives (e, n) of the times of events (e, 5), see `layout.Entry`, in s by the unit of a direction.
 
-    Parameters
-    ----------
-    scene : Scene
-    changes : Directions
-    sampled : bool
-        Whether commands are held.
-    events : array (e, 5)
-        See `layout.Entry`.
-    moments : Moments
+    `sampled`: commands are held.
     """
     bodies, pairs = scene.system.bodies if sampled else scene.system.closed_loop, scene.system.pairs
     body, kind, moved = events[:, Entry.BODY], events[:, Entry.KIND], moments.rates

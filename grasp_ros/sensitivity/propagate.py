@@ -52,7 +52,7 @@ def answer(t: Tangents, side: Body, tick: int, j: int) -> tuple[float, bool]:
     answer.
     """
     row, rates, lane = t.control[side], t.control_rates[side], velocity_lane(side)
-    normals = t.normals[min(tick, t.normals.shape[0] - 1), side]
+    normals = t.normals[side, min(tick, t.normals.shape[1] - 1)]
     x, v = measured(row, normals, t.before[lane - 1], t.before[lane])
     force = feedback(row, x, v)
     limited = math.copysign(1.0, force) * rates[Column.LIMIT, j] if force != 0.0 else 0.0

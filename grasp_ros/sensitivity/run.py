@@ -8,7 +8,7 @@ import numpy as np
 
 from grasp_ros.exact.driver.callback import Observer
 from grasp_ros.exact.integrator import Integrator
-from grasp_ros.physics.control import normals_over
+from grasp_ros.physics.control import normals_of
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.directions import Directions
@@ -17,29 +17,12 @@ from grasp_ros.sensitivity.tangents import Count, Number, tangents_of
 
 
 class Carrier(Observer):
-    """Carries the tangents of one run along, as the observer of its integrator.
+    """Carries the tangents of one run, which has not begun, along as the observer of its integrator.
 
-    Parameters
-    ----------
-    scene : Scene
-    integrator : Integrator
-        Of its run, which has not begun.
-    directions : Directions
-    times : array (m,), s
-        Output times, in any order.
-    sampled : bool
-        Whether commands are held.
-    e : int
-        How many of the output times, the last ones, are times of events.
-
-    Attributes
-    ----------
-    x : array (6, n)
-        Derivatives of the state now.
-    out : array (m, 6, n)
-        At the output times.
-    forces : array (e, 3, 2 + n)
-        At events, of each body: its mass in kg, infinite while it sticks, the constant force on it in N, and its rates.
+    `times` (m,) are output times in s, in any order, the last e of them those of events; `sampled`: commands are held.
+    `x` (6, n) has the derivatives of the state now, `out` (m, 6, n) those at the output times. `forces` (e, 3, 2 + n)
+    has of each body, at the events, its mass in kg, infinite while it sticks, the constant force on it in N, and its
+    derivatives.
     """
 
     def __init__(self, scene: Scene, integrator: Integrator, directions: Directions, times: Array, sampled: bool,
@@ -50,12 +33,9 @@ class Carrier(Observer):
         if sampled or system.external:
             tangents.counts[Count.DRIVEN], tangents.numbers[Number.PERIOD] = 1, scene.time_of(1)
         if sampled:
-            normals = np.zeros((scene.ticks + 1, 2, 2))
-            for side, law in system.laws.items():
-                if law.seed is not None:
-                    normals[:, side] = normals_over(law.seed, 0, scene.ticks + 1)
-            tangents = tangents._replace(control=system.law_rows, control_rates=directions.laws, normals=normals,
-                                         waiting=np.zeros((system.delay, 2, n)))
+            tangents = tangents._replace(
+                control=system.law_rows, control_rates=directions.laws, waiting=np.zeros((system.delay, 2, n)),
+                normals=normals_of(system.laws, 0, scene.ticks + 1))
         super().__init__(propagate, tangents)
         self.x, self.out, self.forces = tangents.x[:, :n], tangents.out, tangents.forces
         integrator.observer = self

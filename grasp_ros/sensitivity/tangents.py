@@ -99,7 +99,7 @@ class Tangents(NamedTuple):
     coulomb: Array  # (n,) of the dry friction
     control: Array  # (2, k) laws of sampled controllers, `physics.control`; without gains: none
     control_rates: Array  # (2, k, n)
-    normals: Array  # (ticks, 2, 2) standard normal numbers of the sensors by tick and side
+    normals: Array  # (2, ticks, 2) standard normal numbers of the sensors by side and tick
     waiting: Array  # (delay, 2, n) of commands on their way: a ring
     external: Array  # (ticks, 3, n)
 
@@ -141,7 +141,7 @@ def tangents_of(plant: Plant, state: State, changes: Directions, times: Array, e
         np.zeros(0), state.y, state.mode, state.clock, plant.bodies, plant.pairs, state.y.copy(),
         x, zeros(STATES, wide), zeros(3, 4, wide), _padded(changes.pairs),
         changes.bodies, np.zeros((3, n)), changes.coulomb[0], np.zeros((2, COLUMNS)), np.zeros((2, COLUMNS, n)),
-        np.zeros((1, 2, 2)), np.zeros((0, 2, n)), changes.external,
+        np.zeros((2, 1, 2)), np.zeros((0, 2, n)), changes.external,
         counts, numbers, times[order], order, np.zeros((m, STATES, n)), np.zeros((e, 3, 2 + n)),
         zeros(wide // HALF * BLOCK), np.zeros((ROWS, TERMS)), zeros(5 * WEIGHTS), zeros(2, ROOM), zeros(3, ROOM),
         np.zeros((5, STATES, STATES)), zeros(FLOWS))

@@ -206,18 +206,14 @@ def has_inputs(scene: Scene, setup: Setup) -> bool:
 def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, which: NDArray[np.int64],
                stop: NDArray[np.int64]) -> NDArray[np.int64]:
     """Integrate rows in one call; returns those that are left to `_run`, because they do not just reach the end."""
-    block, n = variants.block, len(which)
-    loop, own, gains, pairs, coulomb, state = map(np.ascontiguousarray, (
-        variants.closed_loop[which], block["bodies"][which], block["laws"][which][..., : Column.SET_POINT],
-        block["pairs"][which], block["coulomb"][which, 0, 0], block["state"][which, :, 0]))
-    rows = Rows(loop, own, gains, pairs, coulomb, state, np.full((n, SEEN), np.nan), np.zeros((n, 2)),
-                np.full(n, LEFT_OUT))
+    block, outcome = variants.block, np.full(variants.rows, LEFT_OUT)
+    runs.state[:] = block["state"][..., 0]
+    rows = Rows(which, variants.closed_loop, block["bodies"],
+                np.ascontiguousarray(block["laws"][..., : Column.SET_POINT]), block["pairs"], block["coulomb"].ravel(),
+                runs.state, runs.seen, runs.touches, outcome)
     limits = Limits(setup.accuracy, setup.max_events, setup.max_work, stop, setup.settled, setup.horizons)
     integrate_rows(rows, variants.scene.duration, wanted, limits)
-    done = rows.outcome == Ended.DONE
-    runs.seen[which[done]], runs.state[which[done]] = rows.seen[done], rows.state[done]
-    runs.touches[which[done]] = rows.touches[done]
-    return np.asarray(which[~done])
+    return np.asarray(which[outcome[which] != Ended.DONE])
 
 
 def _run(scene: Scene, setup: Setup, wanted: Wanted, runs: Runs, i: int, move: Drive) -> tuple[Status, str]:

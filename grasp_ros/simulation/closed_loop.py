@@ -26,7 +26,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.observation import check
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
-from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
+from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.own_law import begin
 from grasp_ros.simulation.progress import Callback
 from grasp_ros.simulation.sampled_plant import LoopRecord, Outputs, SampledPlant
@@ -87,7 +87,7 @@ def drive_sampled(
             scene = scene.changed(changes[plant.tick])
         # a user's controller has the sensor and the actuator of the scene
         laws = {**{side: ControlLaw() for side in by_user}, **scene.system.laws}
-        outputs = outputs_within(grid, ticks, scene.period_ns)
+        outputs = outputs_within(scene, grid, ticks)
         record = plant.run(laws, outputs, by_user, states[done : done + len(outputs.offsets)])
         if len(ticks) == 1:  # the output times of the last tick and later: nothing acts there
             states[done:], command[done:], done = plant.state, record.answers[0, :OBJECT], n
@@ -130,11 +130,9 @@ def drive_external(scene: Scene, integrator: Integrator, grid: Array) -> Array:
     rows, block = [], list(islice(following, LONGEST + 1))
     while len(block) > 1:
         ticks = np.array(block)
-        outputs = outputs_within(grid, ticks, scene.period_ns)
-        loop = Loop(
-            np.diff(ticks) * scene.period_ns / NANOSECONDS, ticks * scene.period_ns / NANOSECONDS, outputs.bounds,
-            new_place(), np.empty((len(ticks) - 1, 3)), system.external_over(ticks[:-1]),
-        )
+        outputs = outputs_within(scene, grid, ticks)
+        loop = Loop(scene.time_of(np.diff(ticks)), scene.time_of(ticks), outputs.bounds, new_place(),
+                    np.empty((len(ticks) - 1, 3)), system.external_over(ticks[:-1]))
         rows.append(integrator.run(loop, outputs.offsets))
         if integrator.status is not Status.DONE:
             return np.concatenate(rows)
@@ -143,9 +141,9 @@ def drive_external(scene: Scene, integrator: Integrator, grid: Array) -> Array:
     return np.concatenate([*rows, np.repeat(integrator.state[None], later, axis=0)])
 
 
-def outputs_within(grid: Array, ticks: NDArray[np.int64], period_ns: int) -> Outputs:
+def outputs_within(scene: Scene, grid: Array, ticks: NDArray[np.int64]) -> Outputs:
     """Output times within the intervals [t, t') between ascending ticks."""
-    times, lengths = ticks * period_ns / NANOSECONDS, (ticks[1:] - ticks[:-1]) * period_ns / NANOSECONDS
+    times, lengths = scene.time_of(ticks), scene.time_of(ticks[1:] - ticks[:-1])
     bounds = np.searchsorted(grid, times, side="left")
     outputs = Outputs(grid[bounds[0] : bounds[-1]], bounds - bounds[0])
     interval = outputs.interval

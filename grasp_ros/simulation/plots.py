@@ -25,7 +25,7 @@ from grasp_ros.scene.files import format_of, replacing
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Axes, Figure
 from grasp_ros.simulation.quantities import contact_intervals
-from grasp_ros.simulation.tables import A_MOTION, Motion, Tabular
+from grasp_ros.simulation.tables import A_MOTION, Motion
 from grasp_ros.simulation.trajectory import Trajectory
 
 LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR = "#0072b2", "#333333", "#d55e00"  # distinguishable for colour-blind readers
@@ -83,7 +83,7 @@ def compose(
 ) -> Figure:
     """The figure that `draw` writes; its panels are by default those of PANELS that are not empty."""
     for motion in motions:
-        if not len(instance("motion", motion, Tabular, A_MOTION).t) or motion.t[0] == motion.t[-1]:
+        if not len(instance("motion", motion, Motion, A_MOTION).t) or motion.t[0] == motion.t[-1]:
             raise Refused("nothing to draw: the motion has fewer than two output times")
     captions = names("captions", [*map(_caption, motions)] if captions is None else captions)
     if not 0 < len(motions) == len(captions):

@@ -19,7 +19,6 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import OBJECT, Entry
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.simulation.chunk import HORIZONS, SETTLED, Setup, Variants, compute
 from grasp_ros.simulation.closed_loop import drive, outputs_within, solve
 from grasp_ros.simulation.outcomes import GROUPS
@@ -88,8 +87,7 @@ def breaks_of(run: Trajectory) -> Array:
     if run.sampled:
         times.append(tick_times(scene))
     else:
-        times += [np.array([*force.changes(scene.ticks)]) * scene.period_ns / NANOSECONDS
-                  for force in scene.system.external]
+        times += [scene.time_of(np.array([*force.changes(scene.ticks)])) for force in scene.system.external]
     found = np.unique(np.concatenate(times))
     return np.asarray(found[found <= end])
 
@@ -116,7 +114,7 @@ def with_commands(run: Trajectory, grid: Array, integrator: Integrator) -> Array
     answers = np.zeros((count, 3))
     answers[:, :OBJECT] = run.command[np.searchsorted(run.t, tick_times(scene)[:count])]
     plant = SampledPlant(scene.system, scene.period_ns, integrator)
-    states = plant.follow(answers, outputs_within(grid, np.arange(count + 1), scene.period_ns))
+    states = plant.follow(answers, outputs_within(scene, grid, np.arange(count + 1)))
     if plant.status is Status.DONE:
         states = np.concatenate([states, np.repeat(plant.state[None], len(grid) - len(states), axis=0)])
     states[:, scene.system.absent_columns] = np.nan

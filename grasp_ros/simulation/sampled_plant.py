@@ -13,7 +13,7 @@ from grasp_ros.exact.driver.user_controller import UserController
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Loop, new_place
 from grasp_ros.physics import given
-from grasp_ros.physics.control import ControlLaw, normals_over
+from grasp_ros.physics.control import ControlLaw, normals_of
 from grasp_ros.physics.layout import Answer, Place
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.observation import Observation
@@ -26,14 +26,14 @@ NO_TIMES = np.zeros(0)
 
 def tick_times(scene: Scene) -> Array:
     """Times in s of all control periods of a scene, shape (ticks + 1,)."""
-    return np.arange(scene.ticks + 1) * scene.period_ns / NANOSECONDS
+    return np.asarray(scene.time_of(np.arange(scene.ticks + 1)))
 
 
 def tick_of(scene: Scene, t: Array) -> NDArray[np.int64]:
     """The last tick at or before each time in s, shape (n,)."""
     ticks = np.floor(np.asarray(t) * (NANOSECONDS / scene.period_ns)).astype(np.int64)  # rounding may miss it by one
-    ticks -= ticks * scene.period_ns / NANOSECONDS > t
-    ticks += (ticks + 1) * scene.period_ns / NANOSECONDS <= t
+    ticks -= scene.time_of(ticks) > t
+    ticks += scene.time_of(ticks + 1) <= t
     return np.minimum(ticks, scene.ticks)
 
 
@@ -211,10 +211,8 @@ class SampledPlant:
         law = BARE._replace(laws=BARE.laws.copy(), callee=BARE.callee.copy())
         for side, own in laws.items():
             law.laws[side], law.callee[side] = own.row, Answer.LAW
-            if own.seed:
-                if law.normals is BARE.normals:
-                    law = law._replace(normals=np.zeros((2, count, 2)))
-                law.normals[side] = normals_over(own.seed, self.tick, count)
+        if any(own.seed for own in laws.values()):
+            law = law._replace(normals=normals_of(laws, self.tick, count))
         for side, other in (by_user or {}).items():
             law.callee[side] = other.address
             other.observe = partial(self._observation, laws, side)

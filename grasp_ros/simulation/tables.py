@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import numpy as np
 
@@ -20,46 +20,6 @@ if TYPE_CHECKING:
 
 A_MOTION = "a Trajectory or a Recording"
 _ENDINGS = {unit: ending for ending, unit in reversed(UNITS.items())} | {"J": "_J", "W": "_W", "1": ""}
-
-
-class Motion(Protocol):
-    """What is a table: a trajectory or a recording."""
-
-    @property
-    def scene(self) -> Scene:
-        """The scene."""
-
-    @property
-    def t(self) -> Array:
-        """Times (n,) in s."""
-
-    @property
-    def state(self) -> Array:
-        """States (n, 6) in m and m/s."""
-
-    @property
-    def command(self) -> Array:
-        """Commands (n, 2) in N."""
-
-    @property
-    def inputs(self) -> Array:
-        """Forces (n, 3) in N that act on the bodies from then on."""
-
-    @property
-    def impacts(self) -> Array:
-        """Impact forces (n, 2) in N."""
-
-    @property
-    def energy(self) -> Energy:
-        """V, V_c, V' and the contact mode."""
-
-    @property
-    def energy_of(self) -> str:
-        """Whose energy that is."""
-
-    @property
-    def origin(self) -> dict[str, Any]:
-        """Where the motion comes from, by name."""
 
 
 class Column(NamedTuple):
@@ -85,15 +45,35 @@ COLUMNS: tuple[Column, ...] = (
 HEADS = {own.name: own.name + _ENDINGS[own.unit] for own in (TIME, *COLUMNS)}  # of a text file, by columns
 
 
-class Tabular:
-    """Base of motions that can be taken as tables."""
+class Motion:
+    """Base of what can be drawn and taken as a table: a trajectory or a recording."""
 
-    def __repr__(self: Motion) -> str:
+    if TYPE_CHECKING:  # dataclasses would take these for defaults of their fields
+        @property
+        def scene(self) -> Scene: """The scene."""
+        @property
+        def t(self) -> Array: """Times (n,) in s."""
+        @property
+        def state(self) -> Array: """States (n, 6) in m and m/s."""
+        @property
+        def command(self) -> Array: """Commands (n, 2) in N."""
+        @property
+        def inputs(self) -> Array: """Forces (n, 3) in N that act on the bodies from then on."""
+        @property
+        def impacts(self) -> Array: """Impact forces (n, 2) in N."""
+        @property
+        def energy(self) -> Energy: """V, V_c, V' and the contact mode."""
+        @property
+        def energy_of(self) -> str: """Whose energy that is."""
+        @property
+        def origin(self) -> dict[str, Any]: """Where the motion comes from, by name."""
+
+    def __repr__(self) -> str:
         """In a line: whose motion, at how many times, and where it comes from."""
         origin = ", ".join(f"{name} {value}" for name, value in self.origin.items())
         return f"<{type(self).__name__} of {self.scene.name}: {len(self.t)} times, {origin}>"
 
-    def dataset(self: Motion) -> Any:
+    def dataset(self) -> Any:
         """An `xarray.Dataset` over `t`: states, forces, energies, with names and units as attributes.
 
         Raises
@@ -108,7 +88,7 @@ class Tabular:
         return xarray.Dataset({own.name: (TIME.name, values[own.name], {"units": own.unit, "long_name": own.text})
                                 for own in (TIME, *COLUMNS)}, attrs=_attributes_of(self))
 
-    def dataframe(self: Motion) -> Any:
+    def dataframe(self) -> Any:
         """The same as a `pandas.DataFrame`; units by column in its `attrs["units"]`.
 
         Raises
@@ -120,7 +100,7 @@ class Tabular:
         frame.attrs = {**_attributes_of(self), "units": {own.name: own.unit for own in (TIME, *COLUMNS)}}
         return frame
 
-    def to_csv(self: Motion, path: str | os.PathLike[str] | BinaryIO) -> None:
+    def to_csv(self, path: str | os.PathLike[str] | BinaryIO) -> None:
         """The same as a text file, by its path or open: a row for each time; units in the names of the columns.
 
         Numbers have all their digits.

@@ -30,14 +30,14 @@ from grasp_ros.simulation.contacts import check_located, contact_table, side_of
 from grasp_ros.simulation.repeat import breaks_of, states_at
 from grasp_ros.simulation.sampled_plant import LoopRecord, tick_of
 from grasp_ros.simulation.sections import Function, Section, as_function, crossings
-from grasp_ros.simulation.tables import Tabular
+from grasp_ros.simulation.tables import Motion
 
 if TYPE_CHECKING:
     from grasp_ros.simulation.differentiate import Sensitivity
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(Tabular, Frozen):
+class Trajectory(Motion, Frozen):
     """A simulated or recorded motion.
 
     Attributes

@@ -101,6 +101,9 @@ def test_arrays_are_built_and_refused_like_scenes() -> None:
     scene = scenes.load("case_01", [
         "left_feedback.set_point_m=0.01", "right_feedback.set_point_m=0.02", "left_feedback.feed_forward_N=0.3",
         "right_feedback.feed_forward_N=0.1", "object_friction.viscous_Ns_per_m=0.1", "object_friction.coulomb_N=0.2",
+        "loop={}", *(f"{side}_{key}" for side in ("left", "right") for key in (
+            "actuator.limit_N=3", "sensor.noise_seed=1", "sensor.position_noise_m=0.1", "sensor.position_step_m=0.1",
+            "sensor.velocity_noise_m_per_s=0.1", "sensor.velocity_step_m_per_s=0.1")),
     ])
     rng = np.random.default_rng(3)
     named = {name: rng.normal(1.0, 2.0, 200) for name in PLACES}
@@ -119,6 +122,7 @@ def test_arrays_are_built_and_refused_like_scenes() -> None:
             np.testing.assert_array_equal(block["bodies"][i], system.bodies)
             np.testing.assert_array_equal(block["pairs"][i], system.pairs)
             np.testing.assert_array_equal(block["state"][i, :, 0], system.state)
+            np.testing.assert_array_equal(block["laws"][i], system.law_rows)
             assert block["coulomb"][i, 0, 0] == system.coulomb
 
 

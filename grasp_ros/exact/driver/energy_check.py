@@ -10,8 +10,8 @@ from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.kinematics import arm_of, reduced_mass
 from grasp_ros.exact.records import Array, Level, Plant, Settings, State
 from grasp_ros.exact.tolerances import DIED_OUT, ENERGY, ENERGY_UNDERFLOW, MAX_IDLE, NEGLECTED, REST
-from grasp_ros.physics.body_energy import body_energy
 from grasp_ros.physics.domain import LARGEST_POSITION, LARGEST_SPEED
+from grasp_ros.physics.energy import body_energy
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Law, Of, Outcome, Pair, U, V, X
 
 own_energy = kernel(body_energy)

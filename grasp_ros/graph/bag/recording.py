@@ -24,11 +24,11 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.effects.base import BODIES, SIDES
 from grasp_ros.scene.topics import CLOCK, CONTACTS, DIAGNOSTICS, EXTERNAL_FORCES, LYAPUNOV_NAMES, TIMING
 from grasp_ros.simulation import Trajectory, simulate
-from grasp_ros.simulation.tables import Tabular
+from grasp_ros.simulation.tables import Motion
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Recording(Tabular, Frozen):
+class Recording(Motion, Frozen):
     """The contents of a bag.
 
     Attributes

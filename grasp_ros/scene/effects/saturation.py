@@ -11,12 +11,12 @@ from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import SIDES, Effect, Parameter, Sections, oddity
 
 PARAMETERS = (
-    Parameter("limit_N", 0.0, RANGES["force"].high, "largest force of the actuator in both directions", live=True),
+    Parameter("limit_N", 0.0, RANGES["force"].high, "largest force of the actuator in both directions", live=True,
+              place=("laws", Column.LIMIT)),
 )
 
 
-def _build(side: str, sections: Sections, system: System) -> None:
-    system.laws[SIDES[side]].row[Column.LIMIT] = sections[f"{side}_actuator"]["limit_N"]
+def _build(side: str, _: Sections, system: System) -> None:
     system.caveats.append(f"the {side} command is limited, so that less damping may act than V_c assumes")
 
 
@@ -34,7 +34,7 @@ EFFECTS = tuple(
     Effect(
         f"{side}_actuator", f"the force of the {side} actuator is limited", PARAMETERS, partial(_build, side),
         "V_c keeps the energy of the unlimited feedback and may rise while the limit acts",
-        needs=(f"{side}_feedback", "loop"), node=f"{side}_controller", example={"limit_N": 1.0},
+        needs=(f"{side}_feedback", "loop"), row=SIDES[side], node=f"{side}_controller", example={"limit_N": 1.0},
         oddities=partial(_odd, side),
     )
     for side in SIDES
