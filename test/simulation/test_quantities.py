@@ -17,7 +17,7 @@ from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.chunk import Setup
 from grasp_ros.simulation.ensemble import ensemble
-from grasp_ros.simulation.losses import losses
+from grasp_ros.simulation.losses import losses, power_lost
 from grasp_ros.simulation.quantities import HORIZONS, MOTION, contact_intervals, last_outside, settling_times, summary
 from grasp_ros.simulation.sampled_plant import tick_times
 from lab.paper.figures import running_losses
@@ -35,6 +35,14 @@ def test_last_time_outside_of_known_motions() -> None:
 def test_losses_of_a_run_without_output_times_are_refused() -> None:
     with pytest.raises(Refused, match="the run has no output times; allowed: one or more"):
         losses(simulate(scenes.load("case_01"), sampled=True, grid=np.zeros(0)))
+
+
+@pytest.mark.parametrize("name", ["case_01", "friction"])
+def test_rates_of_losses_are_that_of_v_c(name: str) -> None:
+    run = simulate(scenes.load(name))
+    rate = power_lost(run.scene.system, run.state).total
+    assert rate.max() > 1.0
+    assert -2.0 * rate == pytest.approx(run.energy.V_rate, abs=1e-13)
 
 
 @pytest.mark.parametrize("gains", [
