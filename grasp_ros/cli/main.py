@@ -20,6 +20,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib import import_module
 
+import grasp_ros
 from grasp_ros.cli.commands import COMMANDS, overview
 from grasp_ros.cli.parser import Command, Parser, add_levels, shortened
 from grasp_ros.graph.bag.disk import FULL
@@ -152,9 +153,7 @@ class _Version(argparse.Action):
     """Which one this is; asked for only then, because it takes a while to find out."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        from importlib.metadata import version
-
-        print(f"grasp {version('grasp_ros')}")
+        print(f"grasp {grasp_ros.__version__}")
         parser.exit()
 
 

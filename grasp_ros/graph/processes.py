@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import shutil
 import signal
 import socket
 import subprocess
@@ -22,7 +21,7 @@ from grasp_ros.graph.parameters import PEER_SECONDS, START_SECONDS, argument, ch
 from grasp_ros.graph.stopping import GRACE_SECONDS, STOP_SIGNALS
 from grasp_ros.physics.errors import Failed, Refused
 from grasp_ros.scene import Scene
-from grasp_ros.scene.files import writing
+from grasp_ros.scene.files import new_directory
 
 STOP_SECONDS = GRACE_SECONDS + 1.0  # a node says itself that it ends by force
 TOGETHER_SECONDS = 15.0  # plant and monitor end within this time of each other
@@ -104,13 +103,8 @@ class Graph:
         commands = self._commands(self._settings(scene_file))
         self._place = hold(os.environ, self.namespace)
         try:
-            with writing(self.directory):
-                self.directory.mkdir(parents=True)
-                try:
-                    scene_file.write_text(self.scene.to_yaml(), encoding="utf-8")
-                except OSError:
-                    shutil.rmtree(self.directory)
-                    raise
+            with new_directory(self.directory):
+                scene_file.write_text(self.scene.to_yaml(), encoding="utf-8")
         except Refused:
             self.stop()
             raise

@@ -60,6 +60,18 @@ def writing(path: object, refusal: type[Refused] = Refused) -> Iterator[None]:
         raise refusal(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
+@contextmanager
+def new_directory(path: Path, refusal: type[Refused] = Refused) -> Iterator[None]:
+    """Make a directory and its first files, which the system may refuse; then there is none."""
+    with writing(path, refusal):
+        path.mkdir(parents=True)
+        try:
+            yield
+        except OSError:
+            shutil.rmtree(path)
+            raise
+
+
 def format_of(path: str | os.PathLike[str], allowed: Collection[str]) -> str:
     """The ending of a file, in small letters: it decides the format."""
     ending = given.path("path", path).suffix.lower()

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import shutil
 import struct
 import threading
 from collections.abc import Iterable, Iterator, Mapping
@@ -30,7 +29,7 @@ from grasp_ros.graph.running import Running
 from grasp_ros.graph.serialization import template_of
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.files import writing
+from grasp_ros.scene.files import new_directory, writing
 from grasp_ros.scene.strict_yaml import dump
 from grasp_ros.scene.topics import CLOCK, RUN, SCENE, Topic
 
@@ -115,14 +114,9 @@ class Recorder:
         self._custom = {"scene": scene.to_yaml(), "run": (running or Running()).to_yaml(), **words, **topics}
         self._names = rosbag2.names_of(scene, self._custom)
         self._clock = template_of(CLOCK)
-        with writing(path, BagError):
-            path.mkdir(parents=True)
-            try:
-                self._sink = Sink(path / f"{path.name}.mcap", path / ".reserve")
-                self._begin()
-            except OSError:
-                shutil.rmtree(path)
-                raise
+        with new_directory(path, BagError):
+            self._sink = Sink(path / f"{path.name}.mcap", path / ".reserve")
+            self._begin()
         self._thread = threading.Thread(target=self._flush_regularly, name="recorder", daemon=True)
         self._thread.start()
 

@@ -68,7 +68,7 @@ class GraspNode(ParameterNode):
         self.concern = ""  # what is not as it should be, although the node goes on
         self.trouble = ""  # what keeps it from going on
         self.phase = Phase.WAITING
-        self.where = place(os.environ, self.get_namespace())  # it looks for others
+        self.where = place(os.environ, self.get_namespace())  # where it looks for others, in words
         self.words = f"waiting for peers {self.where}"  # what it does or waits for: the message of its /diagnostics
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._diagnostics = self.publisher(DIAGNOSTICS)
