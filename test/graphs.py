@@ -11,7 +11,7 @@ from typing import Any
 
 from mcap.reader import make_reader
 from mcap.writer import Writer
-from processes import DEADLINE
+from processes import DEADLINE, wait_for
 from std_srvs.srv import Trigger
 
 from grasp_ros.graph import bag
@@ -58,13 +58,21 @@ def started(graph: Graph) -> Iterator[dict[str, int]]:
 def call(service: str, node: tuple[Any, Any]) -> Any:
     """Answer of a service of the plant to a node, which has an executor."""
     peer, executor = node
-    client = peer.create_client(Trigger, f"plant/{service}")
+    client, newest = (peer.create_client(Trigger, f"plant/{name}") for name in (service, "status"))
     assert client.wait_for_service(timeout_sec=DEADLINE)
-    future = client.call_async(Trigger.Request())
-    executor.spin_until_future_complete(future, timeout_sec=DEADLINE)
-    assert future.done(), service
-    peer.destroy_client(client)
-    return future.result()
+    assert newest.wait_for_service(timeout_sec=DEADLINE)
+
+    def asked(client: Any, seconds: float) -> Any:
+        future = client.call_async(Trigger.Request())
+        executor.spin_until_future_complete(future, timeout_sec=seconds)
+        return future.result()
+
+    wait_for(lambda: asked(newest, 1.0) is not None, "the plant, which may not know the way back yet")
+    answer = asked(client, DEADLINE)
+    assert answer is not None, service
+    for one in (client, newest):
+        peer.destroy_client(one)
+    return answer
 
 
 def status(node: tuple[Any, Any]) -> dict[str, Any]:

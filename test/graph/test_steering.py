@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -272,3 +273,28 @@ def test_a_number_of_steps_that_no_plant_can_do_is_refused() -> None:
     assert found.returncode == 2
     assert found.stderr.startswith("step 1111")
     assert found.stderr.endswith("1: not allowed; allowed: a whole number >= 1\n")
+
+
+def test_a_question_whose_answer_is_lost_is_asked_again_and_what_acts_is_asked_once(node: Any, launch: Any) -> None:
+    asked: list[str] = []
+
+    def answer(name: str, _: Any, response: Trigger.Response) -> Trigger.Response:
+        asked.append(name)
+        if asked == ["status"]:
+            raise ConnectionError  # nobody is answered
+        words = {"state": "paused", "tick": 1, "ticks": 2, "time_s": 0.0, "scene": "S", "resets": 0}
+        response.success, response.message = True, json.dumps(words)
+        return response
+
+    for name in ("pause", "status"):
+        node[0].create_service(Trigger, f"plant/{name}", partial(answer, name))
+    asks = launch(*GRASP, "ctl", "pause", **PIPES)
+
+    def ended_by() -> bool:
+        with suppress(ConnectionError):
+            node[1].spin_once(timeout_sec=0.05)
+        return asks.poll() is not None
+
+    wait_for(ended_by, "an answer")
+    assert asks.communicate()[0] == "S: paused at tick 1 of 2, t = 0 s, resets: 0\n"
+    assert asked == ["status", "status", "pause"]

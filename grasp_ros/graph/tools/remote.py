@@ -30,7 +30,8 @@ from grasp_ros.scene import strict_yaml
 from grasp_ros.scene.topics import Topic
 
 PATIENCE_SECONDS = 15.0  # without an answer, or without progress; to be found takes over 5 s on a busy machine
-SPIN_SECONDS = 0.1
+SPIN_SECONDS, AGAIN_SECONDS = 0.1, 2.0  # the latter until a question is asked again
+SERVICES = ("pause", "resume", "reset", "step", "status")
 MOST_DIGITS = 20  # of a whole number; a plant refuses those that it cannot do itself
 FAREWELL = ("quit", "exit", "q")
 HELP = "pause, resume, step [N], reset, status, get NODE [NAME ...], set NODE NAME VALUE, echo TOPIC [N]"
@@ -42,12 +43,13 @@ class Remote(GraspNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("remote", **options)
         self._wanted: list[str] = json.loads(self.read_only("words"))
-        self._known: dict[str, Any] = {}
+        names = [f"plant/{name}" for name in SERVICES]
+        self._known: dict[str, Any] = {name: self.create_client(Trigger, name) for name in names}
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self)
         self._actions: dict[str, Callable[..., str]] = {
-            **{name: partial(self.plant, name) for name in ("pause", "resume", "reset", "status")},
-            "step": self.step, "get": self.get, "set": self.put, "echo": self.echo, "help": lambda: HELP,
+            **{name: partial(self.plant, name) for name in SERVICES}, "step": self.step,
+            "get": self.get, "set": self.put, "echo": self.echo, "help": lambda: HELP,
         }
 
     def work(self, received: list[int]) -> bool:
@@ -128,7 +130,9 @@ class Remote(GraspNode):
         return _line(found)
 
     def _status(self, service: str) -> dict[str, Any]:
-        answer = self._ask(Trigger, f"plant/{service}", Trigger.Request())
+        if service != "status":  # may not be asked again; a plant that answers the newest client knows all of them
+            self._status("status")
+        answer = self._ask(Trigger, f"plant/{service}", Trigger.Request(), again=service == "status")
         try:
             found: dict[str, Any] = json.loads(answer.message)
             said = _line(found) if answer.success else found["why"]
@@ -192,15 +196,21 @@ class Remote(GraspNode):
             yield from found
             found.clear()
 
-    def _ask(self, kind: Any, name: str, request: Any) -> Any:
-        """Answer of a service."""
+    def _ask(self, kind: Any, name: str, request: Any, again: bool = True) -> Any:
+        """Answer of a service, asked again if none comes: it is lost where the way back is not known within 0.1 s."""
         if name not in self._known:
             self._known[name] = self.create_client(kind, name)
         client = self._known[name]
         self._wait(client.service_is_ready, f"no {name.rpartition('/')[0]} answers {self.where}")
-        future = client.call_async(request)
-        self._wait(future.done, f"{name}: is there, and has not answered in {PATIENCE_SECONDS:g} s")
-        return future.result()
+        begin, asked = time.monotonic(), [client.call_async(request)]
+
+        def answered() -> bool:
+            if again and time.monotonic() > begin + AGAIN_SECONDS * len(asked):
+                asked.append(client.call_async(request))
+            return any(future.done() for future in asked)
+
+        self._wait(answered, f"{name}: is there, and has not answered in {PATIENCE_SECONDS:g} s")
+        return next(future.result() for future in asked if future.done())
 
     def _wait(self, condition: Callable[[], bool], otherwise: str) -> None:
         deadline = time.monotonic() + PATIENCE_SECONDS

@@ -60,9 +60,9 @@ class Watch(GraspNode):
                 messages.TYPES[topic.type], topic.name, partial(self._on_message, topic), messages.glance_qos(topic),
                 raw=True,
             )
-        services = ("pause", "resume", "step", "status")
-        self._asks = {name: self.create_client(Trigger, f"plant/{name}") for name in services}
-        self._asks["steps"] = self.create_client(SetParameters, "plant/set_parameters")
+        self._asks = {"steps": self.create_client(SetParameters, "plant/set_parameters")}
+        for name in ("pause", "resume", "step", "status"):
+            self._asks[name] = self.create_client(Trigger, f"plant/{name}")
         self._reported: tuple[str, int] | None = None  # state and tick, as the plant says
         self._asked = -math.inf  # since when an answer is waited for
         self.wall_timer(STATUS_SECONDS, self._ask_status)
@@ -101,7 +101,8 @@ class Watch(GraspNode):
         self.finished |= Key.QUIT in self._pressed
         if self._view is None:
             self._pressed.clear()
-        elif all(client.service_is_ready() for client in self._asks.values()):  # otherwise they wait
+        elif self._reported and all(client.service_is_ready() for client in self._asks.values()):
+            # a plant that answers the newest client knows the way back to all of them; otherwise keys wait
             self._view.hint = HINT if self._keys.there else ""
             if self._pressed and time.monotonic() > self._stepped + LOST_SECONDS:
                 self._do(self._pressed.pop(0))
@@ -120,15 +121,13 @@ class Watch(GraspNode):
             self._ask("pause", lambda _: self._ask("steps", lambda _: self._ask("step", done)))
 
     def _ask(self, name: str, then: Callable[[Any], None] = lambda _: None) -> None:
-        """Call a service of the plant, if it is there; then go on with its answer."""
-        client = self._asks[name]
+        """Call a service of the plant; then go on with its answer."""
         one = [Parameter("steps", value=1).to_parameter_msg()]
         request = SetParameters.Request(parameters=one) if name == "steps" else Trigger.Request()
-        if client.service_is_ready():
-            client.call_async(request).add_done_callback(lambda future: then(future.result()))
+        self._asks[name].call_async(request).add_done_callback(lambda future: then(future.result()))
 
     def _ask_status(self) -> None:
-        if time.monotonic() > self._asked + LOST_SECONDS:
+        if self._asks["status"].service_is_ready() and time.monotonic() > self._asked + LOST_SECONDS:
             self._asked = time.monotonic()
             self._ask("status", self._on_status)
 
