@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 import rclpy
-from graphs import whole
+from graphs import call, started, status, whole
 from processes import DEADLINE, GRASP, START, children, ended, growing, node_command, ran, wait_for, write_law
 
 from grasp_ros import scene
@@ -54,6 +54,19 @@ def test_interrupted_run_ends_cleanly(grasp_run: Any, tmp_path: Path, number: si
         full = simulate(scene.load("case_01"), sampled=True)
         assert full.state[:ticks].tobytes() == recording.state.tobytes()
     assert not children(tmp_path)
+
+
+def test_a_monitor_that_is_behind_records_all_that_came_before_a_signal(tmp_path: Path, node: Any) -> None:
+    graph = Graph(scene.load("case_01", ["time.duration_s=100"]), tmp_path / "run", ACCURACY)
+    with started(graph):
+        wait_for(lambda: status(node)["tick"] > 100, "ticks")
+        before = status(node)["tick"]
+        graph.processes["monitor"].send_signal(signal.SIGSTOP)  # until the end, which lets it go on
+        wait_for(lambda: status(node)["tick"] > before + 100, "a plant that is ahead")
+        assert call("pause", node).success
+        wait_for(lambda: status(node)["state"] == "paused", "a pause")
+        tick = status(node)["tick"]
+    assert len(whole(tmp_path / "run" / "bag").tick) == tick + 1
 
 
 def test_an_interrupted_check_says_where_the_bag_is(grasp_run: Any, tmp_path: Path) -> None:

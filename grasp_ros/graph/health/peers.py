@@ -244,6 +244,8 @@ class PeerNode(GraspNode):
         )
 
     def destroy_node(self) -> None:
-        """Say last words before."""
+        """Say last words before, when all that was published has arrived: others may be behind, and DDS sends again."""
+        if self.begun and not self.exit_code:
+            self.flush(*self.publishers)
         self.heartbeats.end(self.words if self.exit_code else "")
         super().destroy_node()

@@ -33,7 +33,7 @@ from grasp_ros.scene.topics import Topic, named
 from grasp_ros.scene.versions import versions
 
 MOST_TICKS, MOST_SECONDS = 128, 0.05  # that are evaluated at once, and of wall time that a tick waits for others
-BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what came before a signal, and without any more of it
+BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what came before a signal; without more when all have ended
 LOOK_SECONDS = 0.01  # between looks for commands that are missing at the end
 MOST_BESIDE_BYTES = 2**24  # beside the states: of a topic from report to report
 DIAGNOSTICS_LEFT_OUT = "diagnostics not recorded"  # which anybody on the host may send
@@ -265,13 +265,17 @@ class Monitor(PeerNode):
                       f" {tick.time_ns / NANOSECONDS} s, mode {int(values['mode'])}, state {tick.state.numbers}")
 
     def _take_what_came(self) -> None:
-        """Record what is on the way when a signal comes, which all nodes may get at once: the plant may be ahead."""
+        """Record what is on the way when a signal comes, which all nodes may get at once: the plant may be ahead.
+
+        The last words of a node come when all that it has sent has arrived.
+        """
         now = quiet = time.monotonic()
         while not self.finished and time.monotonic() < min(now + BEHIND_SECONDS, quiet + QUIET_SECONDS):
             before = self.progress()
             self.sweep()
             self._complete()
-            if self.progress() != before:
+            others = {beat.process for beat in self.heartbeats.alive} - {self.heartbeats.own.process}
+            if self.progress() != before or others:
                 quiet = time.monotonic()
         self._complete()
 
@@ -286,12 +290,10 @@ class Monitor(PeerNode):
             time.sleep(LOOK_SECONDS)
 
     def close(self) -> None:
-        """Close the bag; then let the plant have the last value."""
+        """Close the bag."""
         if self.begun:
             with suppress(*[BagError] if self.exit_code else []):  # it has been said
                 self._take_what_came()
                 self._take_commands()
                 self._recorder.close(self.counters)
                 self.get_logger().info(f"closed the bag {self._path}: {self.counters['ticks']} ticks")
-        if self.finished:
-            self.flush(self._output)

@@ -221,11 +221,9 @@ class Plant(PeerNode):
                 self._bar(self.tick)
 
     def close(self) -> None:
-        """End the progress bar, tell how a run that ends early kept its time, and deliver what has been published."""
+        """End the progress bar, and tell how a run that ends early kept its time."""
         self._show()
         with suppress(OSError):
             self._shown.close()
         if self.begun:
             self.loop.report()
-        if self.finished and not self.exit_code:
-            self.flush(self._states, *(publisher for publisher, _, _ in self._forces))
