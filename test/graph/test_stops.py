@@ -57,7 +57,8 @@ def test_interrupted_run_ends_cleanly(grasp_run: Any, tmp_path: Path, number: si
 
 
 def test_a_monitor_that_is_behind_records_all_that_came_before_a_signal(tmp_path: Path, node: Any) -> None:
-    graph = Graph(scene.load("case_01", ["time.duration_s=100"]), tmp_path / "run", ACCURACY)
+    case, patient = scene.load("case_01", ["time.duration_s=100"]), {"peer_timeout_s": DEADLINE}
+    graph = Graph(case, tmp_path / "run", ACCURACY, plant=patient)
     with started(graph):
         wait_for(lambda: status(node)["tick"] > 100, "ticks")
         before = status(node)["tick"]
