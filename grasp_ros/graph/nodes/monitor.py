@@ -19,7 +19,7 @@ from grasp_ros.graph.bag import BagError
 from grasp_ros.graph.bag.recorder import NOT_RECORDED, Recorder, check_path
 from grasp_ros.graph.bag.rosbag2 import topics_of
 from grasp_ros.graph.health.heartbeat import digest
-from grasp_ros.graph.health.peers import Need, PeerNode
+from grasp_ros.graph.health.peers import BEHIND_SECONDS, Need, PeerNode
 from grasp_ros.graph.lockstep.admission import Limits, Sources
 from grasp_ros.graph.lockstep.synchronizer import ARMS, GIVE_UP_SECONDS, UNCERTAIN_SECONDS, Arrival, Synchronizer, Tick
 from grasp_ros.graph.nodes.lyapunov_monitor import MOST_BYTES, LyapunovMonitor
@@ -33,7 +33,7 @@ from grasp_ros.scene.topics import Topic, named
 from grasp_ros.scene.versions import versions
 
 MOST_TICKS, MOST_SECONDS = 128, 0.05  # that are evaluated at once, and of wall time that a tick waits for others
-BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what came before a signal; without more when all have ended
+QUIET_SECONDS = 0.1  # without any more of what came before a signal, when all others have ended
 LOOK_SECONDS = 0.01  # between looks for commands that are missing at the end
 MOST_BESIDE_BYTES = 2**24  # beside the states: of a topic from report to report
 DIAGNOSTICS_LEFT_OUT = "diagnostics not recorded"  # which anybody on the host may send

@@ -169,9 +169,9 @@ class GraspNode(ParameterNode):
             words = f"{topic.name}: {counter}: {self.counters[counter]}; sources: {names}"
             self.get_logger().warning(f"{words}; {why}" if why else words)
 
-    def flush(self, *publishers: Publisher) -> None:
-        """Let every reader have the last messages before the process ends, within ACKNOWLEDGE_SECONDS in all."""
-        deadline = time.monotonic() + ACKNOWLEDGE_SECONDS
+    def flush(self, *publishers: Publisher, seconds: float = ACKNOWLEDGE_SECONDS) -> None:
+        """Let every reader have the last messages before the process ends, within so many seconds in all."""
+        deadline = time.monotonic() + seconds
         for publisher in publishers:
             publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 1e-3)))
 
