@@ -7,6 +7,7 @@ import os
 import re
 import signal
 import subprocess
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,20 @@ import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from graphs import whole
-from processes import DEADLINE, Terminals, children, ended, growing, more_ticks, node_command, wait_for, write_law
+from processes import (
+    DEADLINE,
+    Terminals,
+    children,
+    ended,
+    growing,
+    more_ticks,
+    node_command,
+    stranger,
+    wait_for,
+    write_law,
+)
 from rclpy.executors import SingleThreadedExecutor
+from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
@@ -223,3 +236,27 @@ def test_a_process_whose_own_end_hangs_is_ended(grasp_run: Any, tmp_path: Path) 
     _, err = ended(run, 1)
     assert "Bad file descriptor" in err
     wait_for(lambda: not children(tmp_path), "the end of all processes")
+
+
+def test_who_waits_for_an_acknowledgement_lets_other_threads_go_on(launch: Any, node: Any) -> None:
+    """Heartbeats come from one. A reader that was killed never acknowledges."""
+    publisher = node[0].create_publisher(JointState, "joint_states", 10)
+    reader = launch(*stranger("reader", "node.create_subscription(JointState, 'joint_states', print, 10)\n"
+                                        "rclpy.spin(node)"))
+    wait_for(lambda: publisher.get_subscription_count() == 1, "the reader")
+    reader.kill()
+    reader.wait()
+    publisher.publish(JointState())
+    turns: list[bool] = []
+    over = threading.Event()
+
+    def go_on() -> None:
+        while not over.wait(0.01):
+            turns.append(True)
+
+    other = threading.Thread(target=go_on)
+    other.start()
+    assert not GraspNode.flush(node[0], publisher, seconds=0.5)
+    over.set()
+    other.join()
+    assert len(turns) > 5

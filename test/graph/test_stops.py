@@ -23,6 +23,7 @@ from grasp_ros import scene
 from grasp_ros.cli.graph import _report
 from grasp_ros.graph import bag
 from grasp_ros.graph.processes import Graph
+from grasp_ros.graph.ros.node import ACKNOWLEDGE_SECONDS
 from grasp_ros.graph.stopping import STOP_SIGNALS
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
@@ -68,6 +69,16 @@ def test_a_monitor_that_is_behind_records_all_that_came_before_a_signal(tmp_path
         wait_for(lambda: status(node)["state"] == "paused", "a pause")
         tick = status(node)["tick"]
     assert len(whole(tmp_path / "run" / "bag").tick) == tick + 1
+
+
+def test_a_reader_that_was_killed_keeps_no_node_for_long(tmp_path: Path, node: Any) -> None:
+    """It acknowledges nothing, and DDS lists it for 20 s."""
+    graph = Graph(scene.load("case_01", ["time.duration_s=100"]), tmp_path / "run", ACCURACY)
+    with started(graph):
+        wait_for(lambda: status(node)["tick"] > 100, "ticks")
+        graph.processes["left_controller"].kill()
+        begin = time.monotonic()
+    assert time.monotonic() - begin < ACKNOWLEDGE_SECONDS
 
 
 def test_an_interrupted_check_says_where_the_bag_is(grasp_run: Any, tmp_path: Path) -> None:

@@ -19,7 +19,6 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rclpy.duration import Duration
 from std_msgs.msg import String
 
 from grasp_ros.graph.ros.node import GraspNode
@@ -81,7 +80,7 @@ class Heartbeats:
     """The heartbeats of a node, and those that it hears."""
 
     def __init__(self, node: GraspNode, heard: Callable[[], None], watch: Callable[[], None]) -> None:
-        self._heard = heard  # called after each one of another node
+        self._node, self._heard = node, heard  # called after each one of another node
         process = _process(str(os.getpid()))[1]
         self.own = Heartbeat(node.get_fully_qualified_name(), uuid.uuid4().hex, [], "", process, False)
         self._beats: dict[str, Heartbeat] = {}
@@ -108,7 +107,7 @@ class Heartbeats:
     def tell(self) -> None:
         """Let all know what has changed, before what is published next."""
         self._beat()
-        self.publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGE_SECONDS))
+        self._node.flush(self.publisher, seconds=ACKNOWLEDGE_SECONDS)
 
     def confirm(self, topic: str) -> None:
         """Let all know that this node has had a message of a topic."""

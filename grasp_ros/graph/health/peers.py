@@ -13,13 +13,14 @@ from typing import Any, NamedTuple
 from grasp_ros.graph.health.heartbeat import ENDED, Heartbeat, Heartbeats, digest
 from grasp_ros.graph.health.watchdog import Watchdog
 from grasp_ros.graph.parameters import check_timeouts
-from grasp_ros.graph.ros.node import PATIENCE_SECONDS, GraspNode, Phase
+from grasp_ros.graph.ros.node import ACKNOWLEDGE_SECONDS, PATIENCE_SECONDS, GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import TEXT_BYTES
 from grasp_ros.scene.topics import ALIVE, DIAGNOSTICS, JOINT_STATES, Topic
 
 LOOK_SECONDS = 0.25
 STILL_SECONDS = 1.0  # between two looks: this thread was busy
+ARRIVAL_SECONDS = 1.0  # at most until what was sent before a signal has arrived: a reader that was killed never says so
 GONE_SECONDS = 0.7  # without a source: its last messages are on the way
 SLOW = 4  # times longer who shows that it lives may take
 MOST_TEXTS = 8  # of a topic, whose digest no heartbeat has yet
@@ -246,6 +247,6 @@ class PeerNode(GraspNode):
     def destroy_node(self) -> None:
         """Say last words before, when all that was published has arrived: others may be behind, and DDS sends again."""
         if self.begun and not self.exit_code:
-            self.flush(*self.publishers)
+            self.flush(*self.publishers, seconds=ACKNOWLEDGE_SECONDS if self.finished else ARRIVAL_SECONDS)
         self.heartbeats.end(self.words if self.exit_code else "")
         super().destroy_node()

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
 from grasp_ros import scene as scenes
@@ -164,7 +163,7 @@ class Controller(PeerNode):
             numbered = list_message(time_ns, [*numbers], [*numbers.values()], frame=str(self._number))
             self._announcements.publish(numbered)
             # What a reader has received before it receives the command, it also sees before.
-            if not self._announcements.wait_for_all_acked(Duration(seconds=ANNOUNCE_SECONDS)):
+            if not self.flush(self._announcements, seconds=ANNOUNCE_SECONDS):
                 self.get_logger().warning(f"{CHANGES[self._side].name}: a subscriber did not acknowledge a change")
 
     def _read(self, cdr: bytes) -> State | None:

@@ -274,7 +274,7 @@ class Monitor(PeerNode):
             before = self.progress()
             self.sweep()
             self._complete()
-            others = {beat.process for beat in self.heartbeats.alive} - {self.heartbeats.own.process}
+            others = {beat.process for beat in self.heartbeats.alive if beat.runs} - {self.heartbeats.own.process}
             if self.progress() != before or others:
                 quiet = time.monotonic()
         self._complete()

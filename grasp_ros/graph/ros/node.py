@@ -28,7 +28,7 @@ from grasp_ros.scene.topics import DIAGNOSTICS, Topic
 PEER_SECONDS = 0.05
 REPORT_SECONDS = 1.0
 PATIENCE_SECONDS = 5.0
-ACKNOWLEDGE_SECONDS = 5.0
+ACKNOWLEDGE_SECONDS, LOOK_SECONDS = 5.0, 1e-3  # the latter between looks for acknowledgements
 LOSSES = ("lost", "silent")  # how the counters begin that are never again as if nothing had been
 SWEEP = 100  # messages of one topic at a time, unless a node ends
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # what discovery answers until it has the name
@@ -169,11 +169,17 @@ class GraspNode(ParameterNode):
             words = f"{topic.name}: {counter}: {self.counters[counter]}; sources: {names}"
             self.get_logger().warning(f"{words}; {why}" if why else words)
 
-    def flush(self, *publishers: Publisher) -> None:
-        """Let every reader have the last messages before the process ends, within ACKNOWLEDGE_SECONDS in all."""
-        deadline = time.monotonic() + ACKNOWLEDGE_SECONDS
-        for publisher in publishers:
-            publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 1e-3)))
+    def flush(self, *publishers: Publisher, seconds: float = ACKNOWLEDGE_SECONDS) -> bool:
+        """Wait until every reader has acknowledged what was published, so many seconds at most; whether all have.
+
+        A longer wait of rclpy's would let no other thread run: no heartbeat, no look at signals.
+        """
+        deadline = time.monotonic() + seconds
+        while not all(publisher.wait_for_all_acked(Duration(seconds=0)) for publisher in publishers):
+            if time.monotonic() > deadline:
+                return False
+            time.sleep(LOOK_SECONDS)
+        return True
 
     def report(self) -> None:
         """Publish the counters."""
