@@ -275,6 +275,23 @@ def test_a_number_of_steps_that_no_plant_can_do_is_refused() -> None:
     assert found.stderr.endswith("1: not allowed; allowed: a whole number >= 1\n")
 
 
+def test_what_a_reset_has_made_impossible_is_waited_for_no_longer(node: Any, launch: Any) -> None:
+    words = {"state": "running", "tick": 1, "ticks": 2, "time_s": 0.0, "scene": "S", "resets": 0}
+
+    def answer(name: str, _: Any, response: Trigger.Response) -> Trigger.Response:
+        found = words | ({"goal": {"state": "paused"}} if name == "pause" else {})
+        words["resets"] = int(name == "pause")
+        response.success, response.message = True, json.dumps(found)
+        return response
+
+    for name in ("pause", "status"):
+        node[0].create_service(Trigger, f"plant/{name}", partial(answer, name))
+    asks = launch(*GRASP, "ctl", "pause", **PIPES)
+    wait_for(lambda: node[1].spin_once(timeout_sec=0.05) is None and asks.poll() is not None, "an answer")
+    said = "somebody else has reset the plant meanwhile; S: running at tick 1 of 2, t = 0 s, resets: 1\n"
+    assert (asks.communicate()[1], asks.returncode) == (said, 1)
+
+
 def test_a_question_whose_answer_is_lost_is_asked_again_and_what_acts_is_asked_once(node: Any, launch: Any) -> None:
     asked: list[str] = []
 

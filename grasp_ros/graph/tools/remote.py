@@ -121,8 +121,11 @@ class Remote(GraspNode):
     def _done(self, found: dict[str, Any]) -> str:
         """Wait for what an answer of the plant promises."""
         goal, deadline = found.get("goal", {}), time.monotonic() + PATIENCE_SECONDS
+        resets = goal.get("resets", found.get("resets", 0))
         while not goal.items() <= found.items():
             before, found = found, self._status("status")
+            if found.get("resets", 0) > resets:
+                raise Failed(f"somebody else has reset the plant meanwhile; {_line(found)}")
             if found != before:
                 deadline = time.monotonic() + PATIENCE_SECONDS
             elif time.monotonic() > deadline:
