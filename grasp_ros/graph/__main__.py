@@ -16,7 +16,7 @@ from importlib import import_module
 from itertools import chain, pairwise
 from typing import Any
 
-from grasp_ros.graph.host import check_reach, remove_left, this_host
+from grasp_ros.graph.host import check_reach, environment, remove_left
 from grasp_ros.graph.parameters import NODES, PARAMETERS, TOOLS, usage
 from grasp_ros.graph.stopping import STOP_SIGNALS, end_late_by_force, end_with_parent, note_signals
 from grasp_ros.physics.errors import Refused, needing
@@ -44,7 +44,7 @@ def main(name: str, child: bool = False) -> int:
     else:
         remove_left()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)  # `grasp run` starts us with all blocked
-    os.environ.update(this_host(os.environ))  # before rclpy looks
+    os.environ.update(environment(os.environ))  # before rclpy looks
     if name == "plant":
         # Numba is not to find what it would import beside itself, which takes half as long as all else: scipy has BLAS,
         # which no kernel uses. A plant runs no code but the package's own.

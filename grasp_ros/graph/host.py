@@ -5,6 +5,9 @@ A graph is reached from this host alone, unless the network is asked for.
 ROS's own setting for that, ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST, only says whom a participant looks for: it still
 listens on every interface, and who names this host as a static peer is let in. So Fast DDS gets a profile, too, whose
 only interface is the loopback one. A participant on this host that has no such profile is found as before.
+
+On the network Fast DDS gets another one, by which what was lost is sent again at once: by default it takes up to 3 s,
+in which a node would seem to be silent.
 """
 
 from __future__ import annotations
@@ -29,10 +32,10 @@ OFF, LOCALHOST, SUBNET = "OFF", "LOCALHOST", "SUBNET"
 RANGES = ("", LOCALHOST, SUBNET, "SYSTEM_DEFAULT")
 DOMAIN, MOST_DOMAIN = "ROS_DOMAIN_ID", 232  # the last one whose ports exist
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
-PROFILE = CONFIG / "this_host.xml"
+PROFILE, NETWORK_PROFILE = CONFIG / "this_host.xml", CONFIG / "network.xml"
 SERVER = "ROS_DISCOVERY_SERVER"
+OTHERS = ("ROS_STATIC_PEERS", SERVER)  # on other hosts
 PROFILE_FILES = ("FASTDDS_DEFAULT_PROFILES_FILE", PROFILES)
-OTHER_WISHES = ("ROS_STATIC_PEERS", SERVER, *PROFILE_FILES)
 MIDDLEWARE, OURS = "RMW_IMPLEMENTATION", "rmw_fastrtps_cpp"  # the one that the profile is for
 LEAST_BYTES = 2**31  # that a node can address: with its libraries and threads it takes up to 1.8e9
 LEAST_FILES = 32  # that a node has open: its libraries, and the sockets of DDS
@@ -44,24 +47,31 @@ INDEX = "share/ament_index/resource_index/rmw_typesupport"  # where an installat
 
 def network(given: Mapping[str, str]) -> dict[str, str]:
     """Variables of a process that the network may reach: ROS's own range if one is set that is more than this host."""
-    return {RANGE: SUBNET} if given.get(RANGE, LOCALHOST) == LOCALHOST else {}
+    return {RANGE: SUBNET} if _stays(given) else {}
 
 
-def this_host(given: Mapping[str, str]) -> dict[str, str]:
-    """Variables that keep a process on this host, unless the given ones wish for something else.
+def environment(given: Mapping[str, str]) -> dict[str, str]:
+    """Variables that keep a process on this host and let DDS repair losses soon, but what the given ones wish for.
 
-    Whoever sets a range beyond this host, peers, a discovery server, a profile of Fast DDS or another middleware has
-    wished for something else.
+    Whoever sets a range beyond this host, peers or a discovery server leaves this host; whoever sets a profile of Fast
+    DDS or another middleware gets no profile.
     """
-    if given.get(RANGE, LOCALHOST) != LOCALHOST:
-        return {}
-    own = given.get(MIDDLEWARE, OURS) != OURS or any(given.get(name) for name in OTHER_WISHES)
-    return {RANGE: LOCALHOST} if own else {RANGE: LOCALHOST, PROFILES: str(PROFILE)}
+    stays = _stays(given)
+    found = {RANGE: LOCALHOST} if stays else {}
+    if given.get(MIDDLEWARE, OURS) != OURS or any(given.get(name) for name in PROFILE_FILES):
+        return found
+    alone = stays and not any(given.get(name) for name in OTHERS)
+    return {**found, PROFILES: str(PROFILE if alone else NETWORK_PROFILE)}
+
+
+def _stays(given: Mapping[str, str]) -> bool:
+    """Whether ROS's range is this host, as it is by default here; a variable without a value is not set."""
+    return (given.get(RANGE) or LOCALHOST) == LOCALHOST
 
 
 def place(given: Mapping[str, str], namespace: str) -> str:
     """Where a process with these variables looks for others, in words."""
-    reach = "this host" if given.get(RANGE) == LOCALHOST else "the network"
+    reach = "this host" if _stays(given) else "the network"
     server = given.get(SERVER)
     through = f", through {SERVER} {server}" if server else ""
     return f"in ROS domain {given.get(DOMAIN) or 0}, namespace {namespace}, on {reach}{through}"

@@ -248,7 +248,8 @@ def test_where_nobody_answers_ctl_and_watch_say_so(launch: Any) -> None:
     """All at once: each waits for long. None needs a home directory."""
     here = f"in ROS domain {os.environ['ROS_DOMAIN_ID']}, namespace /nowhere, on this host"
     asked = {"ctl status": f"no plant answers {here}", "ctl get nobody steps": f"no nobody answers {here}",
-             "ctl echo nothing": "nobody publishes /nowhere/nothing", "watch": f"no plant has come for 10 s {here}"}
+             "ctl echo nothing": f"nobody publishes /nowhere/nothing {here}",
+             "watch": f"no plant has come for 10 s {here}"}
     homeless = {**os.environ, "HOME": "/proc/nowhere"}
     waiting = [launch(*GRASP, *words.split(), "--namespace", "/nowhere", env=homeless, **PIPES) for words in asked]
     for process, said in zip(waiting, asked.values(), strict=True):

@@ -12,6 +12,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from grasp_ros.graph import bag, host, running
 from grasp_ros.graph.bag.opening import Opened
 from grasp_ros.graph.bag.recorder import Recorder
 from grasp_ros.graph.bag.recover import recover
+from grasp_ros.graph.parameters import PEER_SECONDS
 from grasp_ros.graph.running import Running
 from grasp_ros.maps import store
 from grasp_ros.physics.errors import Refused
@@ -33,6 +35,7 @@ from grasp_ros.simulation import simulate
 from lab.drills import recorder
 from lab.studies.records import Journal
 
+DDS = "{http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles}"  # namespace of its profiles
 TAGS = [
     "!!python/object/apply:os.mkdir [owned]", "!!python/object/new:os.mkdir [owned]",
     "!!python/name:os.system", "!!python/module:antigravity",
@@ -157,20 +160,37 @@ def test_words_of_a_stranger_do_nothing_to_a_terminal(tmp_path: Path, command: A
 
 def test_wishes_of_the_user_come_first() -> None:
     here = {host.RANGE: host.LOCALHOST, host.PROFILES: str(host.PROFILE)}
-    assert host.this_host({}) == host.this_host({host.RANGE: host.LOCALHOST}) == here
-    assert host.this_host({"RMW_IMPLEMENTATION": host.OURS}) == here
-    assert host.this_host({host.RANGE: host.SUBNET}) == {}
-    for name in (*host.OTHER_WISHES, "RMW_IMPLEMENTATION"):
-        assert host.this_host({name: "x"}) == {host.RANGE: host.LOCALHOST}
-    assert host.network({}) == host.network({host.RANGE: host.LOCALHOST}) == {host.RANGE: host.SUBNET}
-    assert host.network({host.RANGE: "SYSTEM_DEFAULT"}) == {}
+    there = {host.PROFILES: str(host.NETWORK_PROFILE)}
+    for given in ({}, {host.RANGE: host.LOCALHOST}, {host.RANGE: ""}, {host.MIDDLEWARE: host.OURS}):
+        assert host.environment(given) == here
+        assert host.network(given) == {host.RANGE: host.SUBNET}
+        assert host.place(given, "/").endswith("on this host")
+    for reach in (host.SUBNET, "SYSTEM_DEFAULT"):
+        assert host.environment({host.RANGE: reach}) == there
+        assert host.network({host.RANGE: reach}) == {}
+        assert host.place({host.RANGE: reach}, "/").endswith("on the network")
+    for name in host.OTHERS:
+        assert host.environment({name: "x"}) == {host.RANGE: host.LOCALHOST, **there}
+    for name in (*host.PROFILE_FILES, host.MIDDLEWARE):
+        assert host.environment({name: "x"}) == {host.RANGE: host.LOCALHOST}
+        assert host.environment({name: "x", host.RANGE: host.SUBNET}) == {}
     assert host.place({host.RANGE: host.LOCALHOST, host.SERVER: "there:11811"}, "/").endswith(
         "on this host, through ROS_DISCOVERY_SERVER there:11811")
 
 
+def test_what_was_lost_is_sent_again_before_a_node_seems_to_be_silent() -> None:
+    seconds = []
+    for file in (host.PROFILE, host.NETWORK_PROFILE):
+        [period] = ElementTree.parse(file).iter(f"{DDS}heartbeatPeriod")
+        seconds.append(int(period.findtext(f"{DDS}sec", "")) + 1e-9 * int(period.findtext(f"{DDS}nanosec", "")))
+    assert seconds == [0.2, 0.2]
+    assert seconds[0] < PEER_SECONDS / 4
+
+
 def plain_environment(domain: int, **more: str) -> dict[str, str]:
     """Nothing of what decides from where a node can be reached."""
-    kept = {name: value for name, value in os.environ.items() if name not in (host.RANGE, *host.OTHER_WISHES)}
+    decide = host.RANGE, *host.OTHERS, *host.PROFILE_FILES
+    kept = {name: value for name, value in os.environ.items() if name not in decide}
     return {**kept, "ROS_DOMAIN_ID": str(domain), **more}
 
 

@@ -175,7 +175,7 @@ class Remote(GraspNode):
     def echo(self, topic: str, number: str = "") -> str:
         """Print messages of a topic as they come, a line each; so many, or until a signal."""
         name, wanted = self.resolve_topic_name(topic), _whole(f"echo {topic}", number) if number else None
-        self._wait(lambda: bool(self.count_publishers(name)), f"nobody publishes {name}")
+        self._wait(lambda: bool(self.count_publishers(name)), f"nobody publishes {name} {self.where}")
         [kind, *_] = dict(self.get_topic_names_and_types())[name]
         if kind not in messages.TYPES:
             raise Refused(f"{name}: {kind} cannot be shown; allowed: {', '.join(messages.TYPES)}")
