@@ -35,12 +35,15 @@ from std_srvs.srv import Trigger
 
 from grasp_ros.graph import bag
 from grasp_ros.graph.health.heartbeat import Heartbeat, Heartbeats
+from grasp_ros.graph.health.peers import Need
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode
+from grasp_ros.scene.topics import JOINT_STATES
 from grasp_ros.scene.topics import RUN as RUNNING
 
 pytestmark = pytest.mark.slow  # real processes
+SIGN = {"node": "/plant", "identity": "first", "texts": [], "ended": "", "process": "", "ready": True}  # of life
 
 
 @pytest.fixture
@@ -214,10 +217,9 @@ def test_who_stands_because_another_was_stopped_says_so_and_ends(launch: Any, tm
 
 def test_one_that_has_just_come_is_not_silent_as_the_one_before_it(make: Any) -> None:
     heartbeats = Heartbeats(make(GraspNode, "waiting"), lambda: None, lambda: None)
-    sign = {"node": "/plant", "identity": "first", "texts": [], "ended": "", "process": "", "ready": True}
-    heartbeats._on_beat(String(data=json.dumps(sign)))
+    heartbeats._on_beat(String(data=json.dumps(SIGN)))
     assert heartbeats.quiet(["/plant"], time.monotonic()) == ["/plant"]
-    heartbeats._on_beat(String(data=json.dumps({**sign, "ended": "ended"})))
+    heartbeats._on_beat(String(data=json.dumps({**SIGN, "ended": "ended"})))
     assert heartbeats.quiet(["/plant"], time.monotonic()) == []  # whom DDS lists by now is another one
     heartbeats.end("")
 
@@ -226,6 +228,26 @@ def test_one_that_has_just_come_is_not_silent_as_the_one_before_it(make: Any) ->
 def test_a_process_that_this_machine_does_not_have_is_not_running(process: str) -> None:
     """Anybody can send a heartbeat with any words."""
     assert not Heartbeat("/plant", "first", [], "", process, ready=True).runs
+
+
+def test_a_process_of_another_host_is_not_one_of_this_host_with_its_number(make: Any) -> None:
+    heartbeats = Heartbeats(make(GraspNode, "waiting"), lambda: None, lambda: None)
+    own = heartbeats.own.process
+    heartbeats.end("")
+    number, begun, *whose = own.split()
+    assert Heartbeat("/plant", "first", [], "", own, ready=True).runs
+    for other in (["another", whose[1]], [whose[0], "pid:[1]"]):
+        assert not Heartbeat("/plant", "first", [], "", " ".join([number, begun, *other]), ready=True).runs
+
+
+def test_only_who_has_said_so_has_ended(make: Any) -> None:
+    """Without last words, the network may be cut."""
+    node = make(Controller, "left_controller")
+    node._last[JOINT_STATES], node._gone[JOINT_STATES] = ["/plant"], 0.0
+    for last, words in (("", "is no longer connected"), ("ended", "has ended"), ("full", "has ended: full")):
+        node.heartbeats._on_beat(String(data=json.dumps({**SIGN, "ended": last})))
+        trouble = node._trouble_with(Need(JOINT_STATES), time.monotonic())
+        assert trouble.words == f"joint_states: /plant {words}"
 
 
 @pytest.mark.thorough

@@ -16,6 +16,7 @@ import uuid
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +49,7 @@ class Heartbeat:
     identity: str  # of the process: who takes the place of a node has another one
     texts: list[str]  # digests of what it says on `scene` and `run`
     ended: str  # its last words; empty while it lives
-    process: str  # its number and beginning, as the kernel has them
+    process: str  # its number and beginning, as the kernel has them, and whose numbers these are
     ready: bool  # whether it has begun to look for others: before it may compile
     # Topics of which it has had a message, as far as others wait for that.
     hears: list[str] = field(default_factory=list)
@@ -68,12 +69,19 @@ class Heartbeat:
 
 
 def _process(number: str) -> tuple[str, str]:
-    """State of a process, and its number and beginning; empty if there is none, or no /proc."""
+    """State of a process, and what no other one has, of any host; empty if there is none, or no /proc."""
     try:
         words = Path(f"/proc/{number}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
-        return words[0], f"{number} {words[19]}"
+        return words[0], f"{number} {words[19]} {_numbering()}"
     except (OSError, UnicodeDecodeError, IndexError):
         return "", ""
+
+
+@cache
+def _numbering() -> str:
+    """Whose numbers of processes these are: of a kernel since its start, in this container, say, which counts anew."""
+    started = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="utf-8").strip()
+    return f"{started} {os.readlink('/proc/self/ns/pid')}"
 
 
 class Heartbeats:

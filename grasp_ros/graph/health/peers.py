@@ -140,9 +140,8 @@ class PeerNode(GraspNode):
             if now - self._gone.setdefault(need.topic, now) < GONE_SECONDS:
                 return None
             last = self._last[need.topic]
-            beats = self.heartbeats.of(last)
-            said = [beat.ended for beat in beats if beat.ended]
-            words = f"{need.topic.name}: {' and '.join(last)} {'has ended' if beats else 'publishes it no more'}"
+            said = [beat.ended for beat in self.heartbeats.of(last) if beat.ended]
+            words = f"{need.topic.name}: {' and '.join(last)} {'has ended' if said else 'is no longer connected'}"
             return Trouble(words + "".join(f": {why}" for why in said[-1:] if why != ENDED), True)
         self._gone.pop(need.topic, None)
         self._last[need.topic] = names
