@@ -54,11 +54,11 @@ def environment(given: Mapping[str, str]) -> dict[str, str]:
     """Variables that keep a process on this host and let DDS repair losses soon, but what the given ones wish for.
 
     Whoever sets a range beyond this host, peers or a discovery server leaves this host; whoever sets a profile of Fast
-    DDS or another middleware gets no profile.
+    DDS, but one of ours, or another middleware gets no profile.
     """
-    stays = _stays(given)
+    stays, ours = _stays(given), ("", str(PROFILE), str(NETWORK_PROFILE))
     found = {RANGE: LOCALHOST} if stays else {}
-    if given.get(MIDDLEWARE, OURS) != OURS or any(given.get(name) for name in PROFILE_FILES):
+    if given.get(MIDDLEWARE, OURS) != OURS or any(given.get(name, "") not in ours for name in PROFILE_FILES):
         return found
     alone = stays and not any(given.get(name) for name in OTHERS)
     return {**found, PROFILES: str(PROFILE if alone else NETWORK_PROFILE)}

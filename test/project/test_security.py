@@ -169,6 +169,7 @@ def test_wishes_of_the_user_come_first() -> None:
         assert host.environment({host.RANGE: reach}) == there
         assert host.network({host.RANGE: reach}) == {}
         assert host.place({host.RANGE: reach}, "/").endswith("on the network")
+        assert host.environment({**here, host.RANGE: reach})[host.PROFILES] == str(host.NETWORK_PROFILE)
     for name in host.OTHERS:
         assert host.environment({name: "x"}) == {host.RANGE: host.LOCALHOST, **there}
     for name in (*host.PROFILE_FILES, host.MIDDLEWARE):
