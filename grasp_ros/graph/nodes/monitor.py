@@ -33,7 +33,7 @@ from grasp_ros.scene.topics import Topic, named
 from grasp_ros.scene.versions import versions
 
 MOST_TICKS, MOST_SECONDS = 128, 0.05  # that are evaluated at once, and of wall time that a tick waits for others
-BEHIND_SECONDS, QUIET_SECONDS = 2.0, 0.1  # at most for what came before a signal; without more when all have ended
+BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what came before a signal; without more when all have ended
 LOOK_SECONDS = 0.01  # between looks for commands that are missing at the end
 MOST_BESIDE_BYTES = 2**24  # beside the states: of a topic from report to report
 DIAGNOSTICS_LEFT_OUT = "diagnostics not recorded"  # which anybody on the host may send

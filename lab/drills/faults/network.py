@@ -11,7 +11,7 @@ import subprocess
 import time
 from functools import partial
 
-from grasp_ros.graph.host import LOCALHOST, PROFILE, RANGE, SUBNET
+from grasp_ros.graph.host import LOCALHOST, RANGE, SUBNET
 from grasp_ros.scene.topics import JOINT_STATES
 from lab.drills.faults.drill import Drill, Skipped
 from lab.drills.faults.stage import START_SECONDS, Stage
@@ -80,8 +80,9 @@ def peer(stage: Stage) -> Evidence:
     """A plant with ROS's own LOCALHOST is found by that peer; one of this package's is not."""
     inside = build(stage)
     stage.look_on_from(on(inside["two"], ROS_STATIC_PEERS=f"{LINK}.1"))
-    found = {}
-    for name, more in (("theirs", {WISH: str(PROFILE)}), ("ours", {})):
+    found, empty = {}, stage.place / "theirs.xml"
+    empty.write_text("<dds/>")
+    for name, more in (("theirs", {WISH: str(empty)}), ("ours", {})):
         stage.node("plant", prefix=on(inside["one"], **{RANGE: LOCALHOST, **more}))
         stage.wait(lambda: stage.said("waiting"), START_SECONDS)
         topic = JOINT_STATES.name
