@@ -23,7 +23,7 @@ from lab.drills.faults.verdict import Evidence
 
 CHECKOUT = Path(__file__).parents[3]  # where `python -m lab` runs
 GROUP, NAMES, FILES = "terminal, disk and directory", "names and waiting", "files"
-DISK_BYTES, LIMIT_BLOCKS = 2_500_000, 4_600  # of a file system, and of `ulimit -f`, in units of 512 bytes
+DISK_BYTES, LIMIT_BLOCKS = 3_500_000, 6_600  # of a file system, and of `ulimit -f`, in units of 512 bytes
 IDLE_SECONDS, IDLE_SHARE = 3.0, 0.05  # of a core, while there is nothing to do
 CUTS, FILE_COUNT = 40, 200
 
