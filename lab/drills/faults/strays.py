@@ -132,4 +132,7 @@ def _other_scene(stage: Stage) -> None:
     stage.started["plant"].wait()
     stage.started.pop("plant")
     stage.node("plant", scene="arm_alone")
-    stage.wait(lambda: stage.ended("plant"), 20.0)
+    stage.wait(lambda: stage.ended("monitor"), 20.0)
+    stage.wait(lambda: stage.ended("plant"), 15.0)
+    if not stage.ended("plant"):  # the monitor had ended before it came: it waits for another one
+        stage.signal("plant", signal.SIGINT)
