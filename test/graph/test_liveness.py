@@ -38,7 +38,7 @@ from grasp_ros.graph.health.heartbeat import Heartbeat, Heartbeats
 from grasp_ros.graph.health.peers import Need
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.node import GraspNode
+from grasp_ros.graph.ros.node import NEW, GraspNode
 from grasp_ros.scene.topics import JOINT_STATES
 from grasp_ros.scene.topics import RUN as RUNNING
 
@@ -248,6 +248,16 @@ def test_only_who_has_said_so_has_ended(make: Any) -> None:
         node.heartbeats._on_beat(String(data=json.dumps({**SIGN, "ended": last})))
         trouble = node._trouble_with(Need(JOINT_STATES), time.monotonic())
         assert trouble.words == f"joint_states: /plant {words}"
+
+
+def test_a_node_whose_name_goes_before_its_topics_is_named(make: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    node, need = make(Controller, "left_controller"), Need(JOINT_STATES)
+    for names in (["/plant"], [NEW]):
+        monkeypatch.setattr(node, "sources", lambda _, names=names: names)
+        node._trouble_with(need, time.monotonic())
+    monkeypatch.setattr(node, "sources", lambda _: [])
+    node._trouble_with(need, 0.0)
+    assert node._trouble_with(need, time.monotonic()).words == "joint_states: /plant is no longer connected"
 
 
 @pytest.mark.thorough

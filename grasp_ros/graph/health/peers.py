@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from grasp_ros.graph.health.heartbeat import ENDED, Heartbeat, Heartbeats, digest
 from grasp_ros.graph.health.watchdog import Watchdog
 from grasp_ros.graph.parameters import check_timeouts
-from grasp_ros.graph.ros.node import ACKNOWLEDGE_SECONDS, PATIENCE_SECONDS, GraspNode, Phase
+from grasp_ros.graph.ros.node import ACKNOWLEDGE_SECONDS, NEW, PATIENCE_SECONDS, GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import TEXT_BYTES
 from grasp_ros.scene.topics import ALIVE, DIAGNOSTICS, JOINT_STATES, Topic
@@ -144,7 +144,8 @@ class PeerNode(GraspNode):
             words = f"{need.topic.name}: {' and '.join(last)} {'has ended' if said else 'is no longer connected'}"
             return Trouble(words + "".join(f": {why}" for why in said[-1:] if why != ENDED), True)
         self._gone.pop(need.topic, None)
-        self._last[need.topic] = names
+        if NEW not in names or need.topic not in self._last:  # the name of a node that ends goes before its topics
+            self._last[need.topic] = names
         for patience in (self.patience, SLOW * self.patience):
             there = self._watchdog.resumed < now - patience  # this process itself, all the while
             quiet = self.heartbeats.quiet(names, now - patience) if there else []
