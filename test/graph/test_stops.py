@@ -68,7 +68,7 @@ def test_a_monitor_that_is_behind_records_all_that_came_before_a_signal(tmp_path
         assert call("pause", node).success
         wait_for(lambda: status(node)["state"] == "paused", "a pause")
         tick = status(node)["tick"]
-    assert len(whole(tmp_path / "run" / "bag").tick) >= tick  # on a busy machine the last may come after its second
+    assert len(whole(tmp_path / "run" / "bag").tick) >= tick  # DDS may need more than a second for the last
 
 
 def test_a_reader_that_was_killed_keeps_no_node_for_long(tmp_path: Path, node: Any) -> None:

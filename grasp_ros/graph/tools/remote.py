@@ -31,7 +31,7 @@ from grasp_ros.scene.topics import Topic
 
 PATIENCE_SECONDS = 15.0  # without an answer, or without progress; to be found takes over 5 s on a busy machine
 SPIN_SECONDS, AGAIN_SECONDS = 0.1, 2.0  # the latter until a question is asked again
-SERVICES = ("pause", "resume", "reset", "step", "status")
+SERVICES = ("pause", "resume", "reset", "step", "status")  # of a plant; whoever answers the last client knows all
 MOST_DIGITS = 20  # of a whole number; a plant refuses those that it cannot do itself
 FAREWELL = ("quit", "exit", "q")
 HELP = "pause, resume, step [N], reset, status, get NODE [NAME ...], set NODE NAME VALUE, echo TOPIC [N]"
