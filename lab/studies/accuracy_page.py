@@ -27,7 +27,7 @@ from lab.studies import (
     stability,
 )
 from lab.studies.contenders import all_contenders
-from lab.studies.records import Journal, write_csv
+from lab.studies.records import Journal, write_records
 
 LOOP_SCENE = "case_01"
 QUICK_S = 5.0
@@ -67,7 +67,7 @@ def run(docs: Path | None, directory: Path, quick: bool) -> None:
     limits = stability.limits(arm)
     points = loop.run(case, directory, () if quick else loop.GRAPH_PERIODS_MS)
 
-    write_csv(records, place / "records.csv")
+    write_records(records, place / "records.csv")
     figures.work_precision(records, accuracy.METRIC, place / "error_against_time.png")
     figures.contacts_missed(records, place / "contacts_missed.png")
     figures.energy_drift(drifts, place / "energy_drift.png")

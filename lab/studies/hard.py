@@ -1,4 +1,4 @@
-"""The page of hard cases, family by family: the error of each case, and those of other methods beside it."""
+"""The hard cases: the error of each, and those of other methods beside it, as a page by families and as a table."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from tqdm import tqdm
@@ -17,10 +17,12 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
 from lab.cases.case import Case, Product, Unfinished, Verdict, evaluate
+from lab.cases.families import ORDER
 from lab.cases.registry import cases
 from lab.cases.scenes import library
 from lab.reference.deadline import Deadline, deadline
 from lab.studies import page_figures, pages
+from lab.studies.records import write_csv
 
 OTHERS = (("lsoda_events", 1e-12), ("paper", 1e-4))  # scipy's best on these scenes; the paper's method, step in s
 SECONDS = 1.5  # that another method may take for a case
@@ -75,8 +77,11 @@ def run(docs: Path | None, alone: bool) -> int:
     if docs is not None:
         names = ["this package", *(other.name for other in others)]
         page_figures.hard_cases(counts(rows, len(others)), names, docs / "hard.png")
-        pages.write(docs, "hard", rows=rows, right=right, others=others, compared=_compared(others, rows),
-                    families=_families(rows), seconds=SECONDS, far=FAR)
+        heads = ["family", "case", "promised", "reached", *names[1:], "note"]
+        write_csv(heads, ([row.case.family.name, *cells(row), *["-"] * (len(others) - len(row.others)), row.case.note]
+                          for row in rows), docs / "hard.csv")
+        pages.write(docs, "hard", rows=rows, right=right, names=names[1:], others=others,
+                    compared=_compared(others, rows), families=ORDER, results=_results(rows, len(others)), seconds=SECONDS, far=FAR)
     return 0 if right == len(rows) else 1
 
 
@@ -93,13 +98,16 @@ def _other(case: Case, other: Other) -> Verdict:
 def counts(rows: Sequence[Row], others: int) -> dict[str, list[Counter[str] | None]]:
     """By family: of this package and of each other method how many cases are kept, broken, or without a result."""
     found: dict[str, list[Counter[str] | None]] = {}
-    for name, group in groupby(rows, key=lambda row: row.case.family.name):
-        members = list(group)
+    for name, members in _members(rows).items():
         asked = [row for row in members if row.others]
         found[name] = [Counter(_outcome(row.own, row.case) for row in members)]
         found[name] += [Counter(_outcome(row.others[place], row.case) for row in asked) if asked else None
                         for place in range(others)]
     return found
+
+
+def _members(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    return {name: list(group) for name, group in groupby(rows, key=lambda row: row.case.family.name)}
 
 
 def _outcome(verdict: Verdict, case: Case) -> str:
@@ -121,24 +129,20 @@ def _compared(others: Sequence[Other], rows: Sequence[Row]) -> list[list[str]]:
     return found
 
 
-def _families(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """The tables of the families; a column of notes, and columns of other methods, only where there are any."""
+def _results(rows: Sequence[Row], others: int) -> list[list[str]]:
+    """For each family how many cases are right, and the largest error as a part of its bound; and those of others."""
     found = []
-    for family, group in groupby(rows, key=lambda row: row.case.family):
-        members = list(group)
-        others = [name for name, _ in OTHERS] if any(row.others for row in members) else []
-        notes = any(row.case.note for row in members)
-        found.append({
-            **family._asdict(), "heads": ["case", "promised", "reached", *others, *["note"] * notes],
-            "rows": [[*cells(row), *["-"] * (len(others) - len(row.others)), *[row.case.note] * notes]
-                     for row in members],
-        })
+    for (name, (own, *theirs)), members in zip(counts(rows, others).items(), _members(rows).values(), strict=True):
+        parts = [row.own.error / row.case.bound for row in members if row.own.error and row.case.bound]
+        kept = [f"{count[page_figures.KEPT]} of {count.total()}" if count else "-" for count in theirs]
+        assert own is not None
+        found.append([name, f"{own[page_figures.KEPT]} of {own.total()}", f"{max(parts, default=0.0):.1g}", *kept])
     return found
 
 
 def cells(row: Row) -> list[str]:
     """A case by its name, what is promised, and what is reached, by others, too."""
-    wrong = "" if row.own.right(row.case) else " **wrong**"
+    wrong = "" if row.own.right(row.case) else " (wrong)"
     return [row.case.name, f"{row.case.bound:.1g}", _short(row.own) + wrong, *map(_short, row.others)]
 
 

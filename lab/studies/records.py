@@ -7,7 +7,7 @@ import hashlib
 import json
 import os
 import platform
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
@@ -151,14 +151,19 @@ def scene_key(scene: Scene) -> str:
     return digest(json.dumps(scene.values, sort_keys=True, default=dict))
 
 
-def write_csv(records: Iterable[Record], path: Path) -> None:
-    """All records as a table with a header."""
+def write_csv(heads: Sequence[str], rows: Iterable[Sequence[object]], path: Path) -> None:
+    """A table with a header; None is an empty cell."""
     with writing(path), path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow([*Record._fields, "missed"])
-        for record in records:
-            row = record._replace(found=_pair(record.found), there_are=_pair(record.there_are))  # type: ignore[arg-type]
-            writer.writerow(["" if cell is None else cell for cell in (*row, record.missed)])
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(heads)
+        writer.writerows(rows)
+
+
+def write_records(records: Iterable[Record], path: Path) -> None:
+    """All records as a table with a header."""
+    write_csv([*Record._fields, "missed"], [
+        [*record._replace(found=_pair(record.found), there_are=_pair(record.there_are)), record.missed]  # type: ignore[arg-type]
+        for record in records], path)
 
 
 def _pair(pair: tuple[int, int] | None) -> str | None:

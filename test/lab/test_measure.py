@@ -15,7 +15,7 @@ from documents import horizon, stalling
 from grasp_ros import scene as scenes
 from grasp_ros.accuracy.measure import Answer, Contender, Record, Truth, contender_of, finest
 from lab.studies import accuracy, figures, measure
-from lab.studies.records import Journal, write_csv
+from lab.studies.records import Journal, write_records
 
 SHORT = "time.duration_s=2"
 QUICK = measure.QUICK._replace(stride=1)
@@ -57,7 +57,7 @@ def test_a_method_that_misses_contacts_is_shown_with_its_count(
     assert stalled.error is None
     assert stalled.status.startswith("stopped: a search for the next event does not end")
     assert stalled.missed is not None
-    write_csv(records, tmp_path / "records.csv")
+    write_records(records, tmp_path / "records.csv")
     rows = list(csv.DictReader((tmp_path / "records.csv").read_text(encoding="utf-8").splitlines()))
     assert [row["missed"] for row in rows] == [str(wrong.missed), str(stalled.missed)]
     figures.work_precision(records, accuracy.METRIC, tmp_path / "a.png")

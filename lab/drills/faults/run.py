@@ -80,7 +80,7 @@ def run(drills: Sequence[Drill], docs: Path | None) -> bool:
                 companions.get().close()
     played = [(drill, found[drill.name]) for drill in drills]
     for drill, evidence in played:
-        print(f"{drill.name:<28} {evidence.verdict.value:<22} {page.row(drill, evidence)[1]}")
+        print(f"{drill.name:<28} {evidence.verdict.value:<22} {page.row(drill, evidence)[2]}")
     print(page.summary(played))
     if docs is not None:
         page.write(docs, played)
