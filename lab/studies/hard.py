@@ -81,7 +81,8 @@ def run(docs: Path | None, alone: bool) -> int:
         write_csv(heads, ([row.case.family.name, *cells(row), *["-"] * (len(others) - len(row.others)), row.case.note]
                           for row in rows), docs / "hard.csv")
         pages.write(docs, "hard", rows=rows, right=right, names=names[1:], others=others,
-                    compared=_compared(others, rows), families=ORDER, results=_results(rows, len(others)), seconds=SECONDS, far=FAR)
+                    compared=_compared(others, rows), families=ORDER, results=_results(rows, len(others)),
+                    seconds=SECONDS, far=FAR)
     return 0 if right == len(rows) else 1
 
 
