@@ -1,4 +1,4 @@
-"""Reading what `Trajectory.save` wrote: nothing is believed that no run has."""
+"""Reading what `Trajectory.save` wrote."""
 
 from __future__ import annotations
 
@@ -11,12 +11,10 @@ from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import find
 from grasp_ros.physics import given
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import Entry, Transition
-from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.files import decoding, reading
 from grasp_ros.scene.npz import TEXT, read_npz
-from grasp_ros.simulation.sampled_plant import LoopRecord, tick_of
+from grasp_ros.simulation.sampled_plant import LoopRecord
 from grasp_ros.simulation.trajectory import Trajectory
 
 
@@ -42,7 +40,6 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
             {side: name for side, name in zip(SIDES, data["controllers"].tolist(), strict=True) if name},
             float(data["at_rest"]) if np.isfinite(data["at_rest"]) else None,
         )
-        _check(found)
         own = {name: np.asarray(values) for name, values in found.contents().items()}
         if data.keys() != own.keys():
             raise Refused(f"arrays {', '.join(sorted(data))}; allowed: {', '.join(sorted(own))}")
@@ -56,34 +53,3 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
 def _described(values: np.ndarray) -> str:
     """What two arrays share if one can stand for the other: texts, or the type and shape of numbers."""
     return str(values.tolist()) if values.dtype.kind == TEXT else f"{values.dtype} of shape {values.shape}"
-
-
-def _check(found: Trajectory) -> None:
-    """Refuse numbers that no run has."""
-    events, end, done = found.event_table, found.scene.duration, found.status is Status.DONE
-    gone = found.scene.system.absent_columns
-    acted = found.scene.ticks if found.sampled else 0
-    n = len(found.t)
-    shapes = [("state", found.state, (n, 6)), ("events", events, (len(events), 5)),
-              ("work", found.work, (len(found.counters),))]
-    if found.loop is not None:
-        shapes += [("command", found.loop.command, (n, 2)), ("inputs", found.loop.inputs, (n, 3))]
-    for name, values, shape in shapes:
-        if values.shape != shape:
-            raise Refused(f"{name}: shape {values.shape} is not allowed; allowed: {shape}")
-    given.ascending("t", found.t, end)
-    given.ascending("events", events[:, Entry.TIME], end)
-    there, absent = np.delete(found.state, gone, axis=1), found.state[:, gone]
-    for name, good, allowed in (
-        ("state", not done or np.isfinite(there).all(), "finite numbers"),
-        ("state", np.isnan(absent).all(), "NaN for a body that is not there"),
-        ("command", not done or np.isfinite(found.command).all(), "finite numbers"),
-        ("inputs", not acted or np.isnan(found.inputs[tick_of(found.scene, found.t) == acted]).all(), "NaN at the end"),
-        ("events", np.isfinite(events).all(), "events of this scene"),
-        ("events", np.isin(events[:, Entry.BODY], list(COLUMN)).all(), "events of this scene"),
-        ("events", np.isin(events[:, Entry.KIND], list(Transition)).all(), "events of this scene"),
-        ("work", (found.work >= 0).all(), "numbers >= 0"),
-        ("setting", np.isfinite(found.setting) and found.setting > 0.0, "a number > 0"),
-    ):
-        if not good:
-            raise Refused(f"{name}: not allowed; allowed: {allowed}")

@@ -140,37 +140,19 @@ def test_arrays_that_numpy_does_not_write_are_refused(
 
 
 @pytest.mark.parametrize(("name", "value"), [
-    ("t", np.array(list("abcde"))), ("t", np.zeros(5, complex)), ("t", np.zeros(5, np.float32)),
-    ("t", np.arange(5)), ("t", np.arange(5.0, 0.0, -1.0)), ("t", np.array([0.0, 1.0, 2.0, 3.0, 21.0])),
-    ("t", np.array([0.0, 1.0, np.nan, 3.0, 4.0])), ("state", np.full((5, 6), np.inf)),
-    ("state", np.zeros((5, 6), ">f8")), ("events", np.full((1, 5), 9.0)), ("setting", np.array(-1.0)),
-    ("setting", np.array(np.nan)), ("sampled", np.array("yes")), ("work", np.full(4, -1)),
-    ("state", np.zeros((2, 6))), ("state", np.zeros((5, 5))), ("t", np.zeros((5, 1))), ("t", np.array(0.0)),
-    ("events", np.zeros(3)), ("events", np.zeros((3, 4))), ("command", np.zeros((5, 3))), ("scene", "title: 5"),
-    ("inputs", np.zeros((4, 3))), ("work", np.zeros(2)), ("method", "euler"), ("status", "FINE"),
-    ("setting", "fine"), ("setting", np.zeros(2)), ("work_names", np.array(["a"] * 4)),
-    ("touch_left", np.zeros(0)), ("status", np.array("DONE", dtype=object)), ("energy_of", "mine"),
-    ("events", np.zeros((3, 6))), ("work", np.zeros(8, np.int64)),
+    ("t", np.array(list("abcde"))), ("t", np.zeros(5, complex)), ("t", np.zeros(5, np.float32)), ("t", np.arange(5)),
+    ("state", np.zeros((5, 6), ">f8")), ("state", np.zeros((2, 6))), ("events", np.zeros(3)),
+    ("events", np.zeros((3, 4))), ("sampled", np.array("yes")), ("scene", "title: 5"), ("method", "euler"),
+    ("status", "FINE"), ("status", np.array("DONE", dtype=object)), ("setting", "fine"), ("setting", np.zeros(2)),
+    ("work", np.zeros(2)), ("work_names", np.array(["a"] * 4)), ("touch_left", np.zeros(0)), ("energy_of", "mine"),
+    ("more", np.zeros(5)),
 ])
-def test_numbers_that_no_run_has_are_refused(
+def test_arrays_that_are_not_those_of_a_run_are_refused(
     tmp_path: Path, arrays: dict[str, np.ndarray], name: str, value: Any
 ) -> None:
     np.savez(tmp_path / "a.npz", **signed({**arrays, name: value}))
     with pytest.raises(Refused, match=r"a\.npz: "):
         simulation.load(tmp_path / "a.npz")
-
-
-@pytest.mark.parametrize(("name", "shape"), [("command", (4, 2)), ("command", (5, 3)), ("inputs", (5, 2)),
-                                             ("state", (1, 6))])
-def test_rows_that_do_not_go_with_the_times_of_a_sampled_run_are_refused(
-    tmp_path: Path, name: str, shape: tuple[int, int]
-) -> None:
-    simulate(scenes.load("arm_alone"), grid=np.linspace(0.0, 1.0, 5), sampled=True).save(tmp_path / "a.npz")
-    with np.load(tmp_path / "a.npz") as data:
-        arrays = {**data, name: np.zeros(shape)}
-    np.savez(tmp_path / "b.npz", **signed(arrays))
-    with pytest.raises(Refused, match=rf"b\.npz: not a file of .*: {name}: shape .* allowed; allowed: \(5, [236]\)"):
-        simulation.load(tmp_path / "b.npz")
 
 
 def test_an_encrypted_or_swollen_result_is_refused(
