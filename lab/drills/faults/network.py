@@ -12,6 +12,7 @@ import time
 from functools import partial
 
 from grasp_ros.graph.host import LOCALHOST, RANGE, SUBNET
+from grasp_ros.physics.errors import Failed
 from grasp_ros.scene.topics import JOINT_STATES
 from lab.drills.faults.drill import Drill, Skipped
 from lab.drills.faults.stage import START_SECONDS, Stage
@@ -58,11 +59,11 @@ def build(stage: Stage) -> dict[str, int]:
     if not permitted:
         raise Skipped("no network namespaces may be made here")
     switch = stage.start("switch", ["unshare", "-Urnm", "sh", "-c", SWITCH]).pid
-    _until(switch, "cable")
+    _until(switch, "ip link show cable")
     found = {}
     for number, host in enumerate(HOSTS, start=1):
         found[host] = stage.start(host, [*ENTER, str(switch), "unshare", "-nm", "sh", "-c", PRIVATE]).pid
-        _until(found[host], "lo:.*UP")
+        _until(found[host], "! ip link show cable && ip link show lo | grep UP")  # until then it is on the switch
         _do(switch, f"ip link add {host} type veth peer name eth0 netns {found[host]}"
                     f" && ip link set {host} master cable && ip link set {host} up")
         _do(found[host], f"ip addr add {LINK}.{number}/24 dev eth0 && ip link set eth0 up"
@@ -106,13 +107,15 @@ def cut(stage: Stage, seconds: float) -> None:
 
 
 def _do(pid: int, script: str) -> None:
-    subprocess.run([*ENTER, str(pid), "sh", "-c", script], check=True, capture_output=True)
+    result = subprocess.run([*ENTER, str(pid), "sh", "-c", script], check=False, capture_output=True, text=True)
+    if result.returncode:
+        raise Failed(f"{script}: {result.stderr.strip()}")
 
 
-def _until(pid: int, pattern: str) -> None:
-    """Wait until a host has a link."""
+def _until(pid: int, condition: str) -> None:
+    """Wait until a host is there."""
     end = time.monotonic() + 10.0
-    script = f"ip link show | grep -q '{pattern}' && grep -q ' /dev/shm ' /proc/self/mounts"
+    script = f"{condition} && grep ' /dev/shm ' /proc/self/mounts"
     while subprocess.run([*ENTER, str(pid), "sh", "-c", script], capture_output=True, check=False).returncode:
         if time.monotonic() > end:
             raise Skipped("no network namespaces may be made here")
