@@ -107,6 +107,18 @@ def test_a_file_that_cannot_be_rebuilt_is_compiled_anew(cached: Path) -> None:
     assert answer(cached, cached.read_bytes()) == (42.0, False)
 
 
+def test_kernels_of_another_python_are_not_taken_for_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A graph would compile while its nodes wait for each other."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    kernel_cache.cache_directory.cache_clear()
+    (kernel_cache.cache_directory() / "a.advance.advance.0.nbc").touch()
+    assert kernel_cache.kernels_on_disk()
+    monkeypatch.setattr(sys.implementation, "cache_tag", "cpython-310")
+    kernel_cache.cache_directory.cache_clear()
+    assert not kernel_cache.kernels_on_disk()
+    kernel_cache.cache_directory.cache_clear()
+
+
 def test_kernels_that_cannot_be_kept_where_they_belong_are_kept_among_temporary_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -4,6 +4,7 @@ import hashlib
 import logging
 import os
 import stat
+import sys
 import tempfile
 import uuid
 from contextlib import suppress
@@ -38,11 +39,11 @@ def _base() -> Path:
 
 @cache
 def cache_directory() -> Path:
-    """A directory for the kernels of these sources in this place, which is part of their keys.
+    """A directory for the kernels of these sources in this place, which is part of their keys, for this Python.
 
     Where the one that is asked for cannot be made, it is among temporary files, if no other user can write there.
     """
-    name = hashlib.sha256(f"{sources_digest()} {PACKAGE}".encode()).hexdigest()[:16]
+    name = hashlib.sha256(f"{sources_digest()} {PACKAGE} {sys.implementation.cache_tag}".encode()).hexdigest()[:16]
     try:
         (_base() / name).mkdir(parents=True, exist_ok=True)
     except OSError:
