@@ -24,7 +24,7 @@ import grasp_ros
 from grasp_ros.cli.commands import COMMANDS, overview
 from grasp_ros.cli.parser import Command, Parser, add_levels, shortened
 from grasp_ros.graph.bag.disk import FULL
-from grasp_ros.graph.stopping import is_signalled, on_signals, raise_on_signals, stop_if_signalled
+from grasp_ros.graph.stopping import is_signalled, on_signals, raise_on_signals
 from grasp_ros.physics.errors import Refused, described, needing
 
 HELP = f"""\
@@ -103,7 +103,6 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
         set_level(options)
         with needing("this"):
             status = command(options)
-        stop_if_signalled()
         if getattr(options, "verbose", False):
             _say_more(time.monotonic() - begin)
         return status

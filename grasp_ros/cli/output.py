@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
-from grasp_ros.graph.stopping import stop_if_signalled
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import replacing
 
@@ -46,7 +45,6 @@ def bar(total: float | None, unit: str, name: str) -> AbstractContextManager[Cal
 
 def show(options: argparse.Namespace, text: str, data: Any) -> None:
     """Print a result: its text, or with `--json` its data; on the standard error if a file goes to the output."""
-    stop_if_signalled()
     shown = json.dumps(plain(data), indent=1) if options.json else text
     stream = sys.stderr if getattr(options, "output", None) == STDOUT else sys.stdout
     try:
@@ -71,7 +69,6 @@ def plain(data: Any) -> Any:
 @contextmanager
 def destination(path: Path) -> Iterator[BinaryIO]:
     """The file of `-o`, see `scene.files.replacing`, or the standard output for `-`."""
-    stop_if_signalled()
     if path != STDOUT:
         with replacing(path) as file:
             yield file

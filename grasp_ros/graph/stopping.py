@@ -16,10 +16,12 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 GRACE_SECONDS = 10.0  # to end cleanly after a signal, or after the process that started this one has ended
+AGAIN_SECONDS = 0.001
 MOST_WORDS = 4000  # characters
 PR_SET_PDEATHSIG = 1  # of prctl(2)
 _raised: list[int] = []  # signals that `raise_on_signals` has turned into an exception
@@ -77,8 +79,8 @@ def end_by_force(name: str, status: int = 1) -> None:
 def raise_on_signals() -> None:
     """Let every signal that ends a process be a KeyboardInterrupt, so that files are closed and parts removed.
 
-    Where Python cannot let an exception pass, in the end of an object or in a callback of C, it prints and drops it:
-    `stop_if_signalled` raises it again. Processes that are forked from this one have the system's own reactions again.
+    Where it cannot pass, in the end of an object or in code of C, which prints it, it comes again a moment later.
+    Processes that are forked from this one have the system's own reactions again.
     """
     before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
     changed = [number for number in before if before[number] in (signal.SIG_DFL, signal.default_int_handler)]
@@ -92,6 +94,8 @@ def raise_on_signals() -> None:
     _raised.clear()
     if changed:
         os.register_at_fork(after_in_child=give_back)
+        sys.unraisablehook = partial(_raise_again, sys.unraisablehook)
+        sys.excepthook = partial(_raise_again, sys.excepthook)
 
 
 def _interrupt(number: int, _: object) -> None:
@@ -99,15 +103,18 @@ def _interrupt(number: int, _: object) -> None:
     raise KeyboardInterrupt
 
 
+def _raise_again(others: Callable[..., object], *dropped: Any) -> None:
+    if _raised and getattr(dropped[0], "exc_type", dropped[0]) is KeyboardInterrupt:
+        signal.signal(signal.SIGALRM, _interrupt)
+        signal.setitimer(signal.ITIMER_REAL, AGAIN_SECONDS)
+    else:
+        others(*dropped)
+
+
 def is_signalled() -> bool:
     """Whether a signal came: what is raised afterwards may be what others, an import of numpy say, have made of it."""
+    signal.setitimer(signal.ITIMER_REAL, 0.0)  # it is answered
     return bool(_raised)
-
-
-def stop_if_signalled() -> None:
-    """Raise the KeyboardInterrupt of a signal that came, if it has been dropped; before results are written, say."""
-    if is_signalled():
-        raise KeyboardInterrupt
 
 
 def tell_parent(node: str, why: str, status: int = 1) -> bool:
