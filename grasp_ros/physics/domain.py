@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.physics.impact_law import STORED, elastic_force, stored_energy
+from grasp_ros.physics.impact_law import EXPONENT, STORED, elastic_force, stored_energy
 from grasp_ros.physics.layout import EPS, OBJECT, Law, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
@@ -24,6 +24,7 @@ LARGEST_SPEED = 1e12  # m/s
 SMALLEST = 1e-36  # in SI, of a number that is not 0; a position or a velocity may decay to any
 SIGNS = np.array([1.0, -1.0])  # of what points to the object, by side
 PART = 1e-3  # of a rounding, that a gap is at least
+CONSTANTS = 40.0  # time constants, after which a motion is at rest: e^-40 is less than a rounding
 
 
 class Range(NamedTuple):
@@ -106,6 +107,18 @@ class Systems:
         inward: Array = (push - mass * common[:, None])[:, :OBJECT] * SIGNS
         return np.maximum(inward, 0.0) * self.touching
 
+    @cached_property
+    def pressing(self) -> Array:
+        """Time for which `pressed` moves a pair, (n, 2) in s: until springs and dampers of the arms hold it at rest."""
+        arms = self._bodies[:, :OBJECT] * self.touching[..., None]
+        damping, stiffness = arms[..., Of.DAMPING].sum(axis=1), arms[..., Of.STIFFNESS].sum(axis=1)
+        mass = self.mass.sum(axis=1)
+        law = np.where(self.touching[..., None], self._pairs, 1.0)
+        depth = (self.pressed / law[..., Law.HERTZIAN]) ** (1.0 / EXPONENT)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            together = np.where(stiffness > 0.0, 2.0 * mass / damping + damping / stiffness, np.inf)
+        return np.minimum(self.duration, CONSTANTS * (together[:, None] + law[..., Law.DISSIPATION] * depth / EXPONENT))
+
     def gaps(self) -> Array:
         """Gap or penetration in roundings of the largest position, (n, 2)."""
         return np.abs(self.gap) / _rounding(self.x) * self.touching
@@ -121,7 +134,7 @@ class Systems:
         return np.asarray(np.sqrt(2.0 * stored / self.reduced))
 
     def impulses(self) -> Array:
-        """Largest p J / mu, (n, 2): J from the approach, a start pressed in, and constant forces over the duration.
+        """Largest p J / mu, (n, 2): J from the approach, a start pressed in, and constant forces.
 
         A pair pressed by the force F relaxes at the rate p F / mu, so this counts relaxation times: p F t / mu where F
         presses for a time t, and p v for an impact at v that loses all of v.
@@ -129,7 +142,7 @@ class Systems:
         loss, depth = self._pairs[..., Law.DISSIPATION], np.maximum(-self.gap, 0.0)
         elastic: Array = elastic_force(self._pairs[..., Law.HERTZIAN], depth) * self.touching
         outward = np.minimum(self.duration, loss / STORED * depth)  # s, separating at 1/p
-        force = elastic * outward + self.pressed * self.duration
+        force = elastic * outward + self.pressed * self.pressing
         return loss * self.touching * (self.speed[:, :OBJECT] + self.speed[:, OBJECT:] + force / self.reduced)
 
 
