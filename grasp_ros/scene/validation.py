@@ -92,5 +92,7 @@ def check_domain(source: str, values: Mapping[str, Mapping[str, Any]], system: S
     if found is not None:
         rule, name, measured = found
         section, _, key = name.partition(".")
-        raise SceneError(f"{source}: {name}: {values[section][key]!r} is not allowed: {rule.text} is {measured:.6g};"
+        short = f"{measured:.6g}"
+        number = repr(measured) if float(short) in (rule.low, rule.high) else short
+        raise SceneError(f"{source}: {name}: {values[section][key]!r} is not allowed: {rule.text} is {number};"
                          f" allowed: {rule.allowed}")

@@ -15,6 +15,7 @@ from grasp_ros.physics.domain import RANGES, RULES, SMALLEST, Systems, outside
 from grasp_ros.physics.layout import EPS
 from grasp_ros.scene import Scene, SceneError
 from grasp_ros.scene.effects import EFFECTS
+from grasp_ros.simulation import simulate
 from grasp_ros.simulation.chunk import Variants
 from lab.oracles.metamorphic import scaled
 
@@ -36,6 +37,9 @@ def grasp(seconds: float = 1.0, **numbers: dict[str, float]) -> Scene:
 ROUNDING = EPS * 0.5  # of the largest position
 PUSH = {"position_gain_N_per_m": 0.0, "velocity_gain_Ns_per_m": 0.0}
 LOSSLESS = {"dissipation_s_per_m": 0.0}
+HELD = {"stiffness_N_per_m": 15.0, "damping_Ns_per_m": 6.0, "position_m": 0.0}
+SQUEEZED = {"left_arm": HELD, "right_arm": HELD, "left_feedback": PUSH | {"feed_forward_N": 1.0},
+            "right_feedback": PUSH | {"feed_forward_N": -1.0}}
 Sections = dict[str, dict[str, float]]
 EDGES: tuple[tuple[str, str, float, float, Sections], ...] = (  # rule, key, inside, outside, the rest
     ("gap or depth", "left_arm.position_m", -1.01e-3 * ROUNDING, -0.99e-3 * ROUNDING, {}),
@@ -54,6 +58,7 @@ EDGES: tuple[tuple[str, str, float, float, Sections], ...] = (  # rule, key, ins
     ("p J / mu", "left_contact.dissipation_s_per_m", 1.57e5, 1.59e5, {"left_arm": {"position_m": 0.1}}),
     ("p J / mu", "right_contact.dissipation_s_per_m", 3.3e7, 3.4e7,
      {"left_feedback": PUSH | {"feed_forward_N": 1.0}, "right_feedback": PUSH | {"feed_forward_N": -1.0}}),
+    ("p J / mu", "left_contact.dissipation_s_per_m", 2.9e4, 3e4, {"time": {"duration_s": 1e6}, **SQUEEZED}),
 )
 
 
@@ -76,6 +81,21 @@ def test_a_rule_accepts_just_inside_and_refuses_just_outside(
     if key == "time.duration_s":
         changes["time.control_period_s"] = [inside / 1e4, beyond / 1e4]
     assert Variants(scene, changes).faults() == {1: str(caught.value)}
+
+
+@pytest.mark.parametrize("loss", [3.0, 100.0])
+def test_a_grasp_that_its_springs_hold_at_rest_may_be_held_for_long(loss: float) -> None:
+    """It was refused by an impulse that counted its forces for the whole run."""
+    numbers = {f"{side}_contact.dissipation_s_per_m": loss for side in ("left", "right")}
+    run = simulate(scenes.load("preload").changed({"time.duration_s": 1e6, **numbers}), grid=[0.0, 1e6])
+    assert run.at_rest is not None
+    assert run.at_rest < 20.0
+    assert sum(run.counters.values()) < 1000
+
+
+def test_a_measure_close_to_its_bound_is_told_with_its_digits() -> None:
+    with pytest.raises(SceneError, match=r"duration is 10000000000\d\d.\d+; allowed: at most 1e\+12"):
+        grasp(time={"duration_s": 1e6}, right_arm={"stiffness_N_per_m": 1e12, "mass_kg": 1.0 - 1e-11})
 
 
 def test_every_rule_has_an_edge() -> None:
