@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -76,6 +77,18 @@ def test_random_steering_leaves_a_bag_that_verifies(tmp_path: Path) -> None:
     lengths[2] += 1
     assert "first difference: run 2" in " ".join(steering.problems(tmp_path / "run" / "bag", lengths))
     assert bag.read(tmp_path / "run" / "bag").closed
+
+
+def test_a_second_plant_gives_way_and_leaves_the_run_as_it_is(paused: Any, launch: Any) -> None:
+    """Controllers took its scene, and kept it when it had ended; or the first plant ended, too."""
+    run, shell, ask = paused("case_01", "--set", "time.duration_s=2")
+    _, err = ended(launch(*node_command("plant", scene="case_04"), stderr=subprocess.PIPE), 1)
+    assert "another plant publishes here" in err
+    assert "running" in ask("resume")
+    ended(shell)
+    out, err = ended(run)
+    assert "2001 states follow from the recorded inputs, bit for bit" in out
+    assert re.search("same without ROS +equal, bit for bit", out)
 
 
 @pytest.mark.parametrize("rate", [1.5, 100.0])  # the second is faster than any reader, and waits for it

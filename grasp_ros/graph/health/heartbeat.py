@@ -53,6 +53,7 @@ class Heartbeat:
     ready: bool  # whether it has begun to look for others: before it may compile
     # Topics of which it has had a message, as far as others wait for that.
     hears: list[str] = field(default_factory=list)
+    scene: str = ""  # digest of the scene that it works with
     heard: float = 0.0  # wall time of the last one, s
 
     @property
@@ -92,6 +93,7 @@ class Heartbeats:
         process = _process(str(os.getpid()))[1]
         self.own = Heartbeat(node.get_fully_qualified_name(), uuid.uuid4().hex, [], "", process, False)
         self._beats: dict[str, Heartbeat] = {}
+        self._met: dict[str, float] = {}  # since when nodes are known whose scene is asked for
         self._last = 0.0  # wall time of the last own one
         self.prepared = 0.0  # that of the last one of a node that is not ready
         self.publisher = node.publisher(ALIVE)
@@ -122,6 +124,18 @@ class Heartbeats:
         if topic not in self.own.hears:
             self.own.hears.append(topic)
             self.tell()
+
+    def works_with(self, scene: str) -> None:
+        """Let all know whose scene this node has taken, by its text; empty: none."""
+        self.own.scene = digest(scene) if scene else ""
+        self.tell()
+
+    def without(self, scene: str, names: Sequence[str]) -> list[str]:
+        """Which of these nodes do not say that they work with a scene; nothing of those that may have no heartbeat."""
+        limit = time.monotonic() - MISSED * HEARTBEAT_SECONDS
+        self._met = {name: self._met.get(name, time.monotonic()) for name in names}
+        return [name for name, met in self._met.items()
+                if ((beats := self.of([name])) and beats[-1].scene != scene) or (not beats and met > limit)]
 
     def end(self, words: str) -> None:
         """The last heartbeat."""
@@ -182,7 +196,7 @@ def _parsed(text: str) -> Heartbeat | None:
         return None
     try:
         beat = Heartbeat(**json.loads(text))
-        words = [beat.node, beat.identity, beat.ended, beat.process, *beat.texts, *beat.hears]
+        words = [beat.node, beat.identity, beat.ended, beat.process, beat.scene, *beat.texts, *beat.hears]
     except (ValueError, TypeError, RecursionError):
         return None
     lists = isinstance(beat.texts, list) and isinstance(beat.hears, list)

@@ -67,6 +67,7 @@ class PeerNode(GraspNode):
         # Texts that wait: since when, on which topic, and who takes them.
         self._texts: list[tuple[float, Topic, str, Callable[[str], None]]] = []
         self._taken: dict[Topic, tuple[str, str]] = {}  # digest, and who said it
+        self._held: set[str] = set()  # digests of texts that wait until another plant has ended
         self.counters.update({"silent peers": 0, "refused texts": 0, "second sources": 0})
         self._watchdog = Watchdog(
             self.get_name(), self.patience, self.blocking_limit, self._ends, lambda: self.heartbeats.frozen()
@@ -223,11 +224,17 @@ class PeerNode(GraspNode):
         for entry in tuple(self._texts):
             when, topic, text, take = entry
             name = digest(text)
-            beat = self.heartbeats.sender_of(name)
-            if beat is None and (time.monotonic() - when < self.patience or self._has_ended(topic)):
+            beat, before = self.heartbeats.sender_of(name), self._taken.get(topic, ("", ""))[1]
+            if beat and before not in ("", beat.identity) and not self.heartbeats.successor(before):
+                self._held.add(name)  # a newer plant than the one that is there gives way, or takes over later
+                continue
+            waits = time.monotonic() - when < self.patience or self._has_ended(topic)
+            if beat is None and waits and name not in self._held:
                 continue
             self._texts.remove(entry)
-            if beat is None and not self._is_foreign(topic):
+            if beat is None and name in self._held:  # it has given way
+                self._held.remove(name)
+            elif beat is None and not self._is_foreign(topic):
                 self.refuse("refused texts", topic)
             elif (known := (name, beat.identity if beat else "")) != self._taken.get(topic) or beat is None:
                 self._taken[topic] = known

@@ -94,7 +94,9 @@ class Controller(PeerNode):
             self.phase, self.words = Phase.IDLE, f"waits for another scene: {error}"
             self.concern = "no command in this scene"
             self.get_logger().error(self.words)
+            self.heartbeats.works_with("")
             return
+        self.heartbeats.works_with(text)
         if self._ready_to_answer:  # this node stays; those that listen may be new
             self._ready_to_answer = False
             self.when(self._ready, self._start)

@@ -114,6 +114,7 @@ class Monitor(PeerNode):
             beat = self.heartbeats.sender_of(digest(text))
             self._plant = beat.identity if beat else ""
             self._scene = scenes.parse(text, topics.SCENE.name, f"topic {topics.SCENE.name}")
+            self.heartbeats.works_with(text)
             self._begin()
 
     def _begin(self) -> None:

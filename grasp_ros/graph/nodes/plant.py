@@ -53,6 +53,7 @@ class Plant(PeerNode):
         self._plant = self._new_plant()
         self._state_template = template_of(JOINT_STATES, [NAMES[body] for body in self.scene.system.present])
         self._clock_template = template_of(CLOCK)
+        self._others = False  # whether there was another plant at the last report
         self.resets, self.published_at = 0, math.inf  # wall time of the current state, s
         self._recorded, self.recorded_at = -1, -math.inf  # last tick that the monitor has; when it said so
         self._begin = math.nan  # wall time of the first state
@@ -140,10 +141,16 @@ class Plant(PeerNode):
             self.loop.ask_again(time.monotonic())
 
     def _refuse_other_plants(self) -> None:
-        """Fail if there is another one; before the start, only if it has a heartbeat: others may be dead."""
+        """Fail if there is another one that does not give way.
+
+        Before the start any that has a heartbeat, for others may be dead; later one without, if it stays: those of this
+        package see that this one is there.
+        """
         names = self.sources(JOINT_STATES)
-        alive = not all(map(self.is_dead, self.heartbeats.of(names)))
-        if alive or (self.begun and len(self.living(JOINT_STATES)) > 1):
+        own, before = self.get_fully_qualified_name(), self._others
+        self._others = self.begun and any(name != own and not self.heartbeats.of([name]) for name in names)
+        alive = not self.begun and not all(map(self.is_dead, self.heartbeats.of(names)))
+        if alive or (before and self._others):
             self.fail(f"{self._states.topic_name}: another plant publishes here, sources {', '.join(names)};"
                       " use another ROS_DOMAIN_ID or namespace")
 
@@ -152,7 +159,11 @@ class Plant(PeerNode):
         missing = [*filter(None, [self.missing(JOINT_STATES)]), *self.loop.missing()]
         monitor = [LYAPUNOV] if self.monitored else []
         missing += [] if self.linked(self._states, monitor) else [LYAPUNOV.name]
-        if missing:
+        nodes = [name for topic in [*self.loop.topics, *monitor] for name in self.sources(topic)]
+        busy = self.heartbeats.without(self.heartbeats.own.texts[-1], nodes)
+        if busy and not missing:
+            self.words = f"waiting for {' and '.join(busy)} to take this scene"
+        elif missing:
             incompatible = self.incompatible(self.scene.controllers.values())
             self.words = "; ".join((f"waiting for {', '.join(missing)}", *incompatible))
         else:
@@ -162,7 +173,7 @@ class Plant(PeerNode):
         # Who has been here with another plant must have this scene before its first state.
         known = all(self.linked(publisher, ()) and publisher.wait_for_all_acked(Duration(seconds=0))
                     for publisher in (*self._descriptions, self.heartbeats.publisher))
-        return not missing and known and self.linked(self._states, [*self.loop.topics, *monitor]) and all(
+        return not (missing or busy) and known and self.linked(self._states, [*self.loop.topics, *monitor]) and all(
             self.linked(publisher, monitor) for publisher, _, _ in self._forces
         )
 
