@@ -147,7 +147,7 @@ HEAVY_OBJECT = (
     "The object has no damper: its energy leaves through the arms, in impacts that move it the less the heavier it is."
 )
 
-OBSERVATIONS = numbered("O", "p. 247, observation", {
+OBSERVATIONS = numbered("P", "p. 247, observation", {
     "Collisions that lose energy stabilise a grasp whose arms have no damping.": [
         LOSSY_IMPACTS,
         Share("The motion of No. 3 settles.", marginal_settles,

@@ -19,17 +19,17 @@ from grasp_ros.scene.files import writing
 from grasp_ros.scene.versions import versions
 from lab.paper import arms, beyond, cases, claims, equation_table, knife_edge, measures, scatter, universal
 from lab.paper.claims import Claim, Kind, Verdict, tally
-from lab.paper.doubts import Doubts
 from lab.paper.equation_table import Equation
 from lab.paper.equations import CROSSING
 from lab.paper.printed import PRINTED
 from lab.paper.prints import Compared
 from lab.paper.results import Beyond, tables
+from lab.paper.uncertainties import Uncertainties
 from lab.studies import pages
 
 Row = tuple[str, ...]
 FIGURES = "paper"  # directory of the figures beside the Markdown page
-NUMBERED = "O", "C"  # letters of the claims that the paper numbers
+NUMBERED = "P", "C"  # letters of the claims that the paper numbers
 WORDS = {  # what `words.yaml` names beside the fields of a report
     "math": math, "arms": arms, "beyond": beyond, "cases": cases, "edge": knife_edge, "measures": measures,
     "rule": claims, "scatter": scatter, "table": equation_table, "universal": universal, "kinds": Kind,
@@ -57,7 +57,7 @@ class Report(NamedTuple):
     quantities: tuple[Row, Sequence[Row]]
     equations: Sequence[Equation]
     found: Beyond
-    doubts: Doubts
+    uncertainties: Uncertainties
     replays: Sequence[dict[str, Any]]
     images: Mapping[str, bytes]  # PNG
 
