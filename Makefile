@@ -8,7 +8,7 @@ SLOWER ?= 0.3
 export ROS_DOMAIN_ID ?= 42
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
-# Studies that write a page, those first that take longest; what one of them is asked beside.
+# Studies that write a page, those first that take longest; and further arguments of one of them.
 PAGES := derivatives accuracy maps fuzz hard paper faults effects certificate domain
 fuzz_options := --draws 5000 --jobs 2
 
