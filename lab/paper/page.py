@@ -7,7 +7,6 @@ import json
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,7 +15,6 @@ from markupsafe import Markup
 from ruamel.yaml import YAML
 
 from grasp_ros.scene.files import writing
-from grasp_ros.scene.versions import versions
 from lab.paper import arms, beyond, cases, claims, equation_table, knife_edge, measures, scatter, universal
 from lab.paper.claims import Claim, Kind, Verdict, tally
 from lab.paper.equation_table import Equation
@@ -28,6 +26,7 @@ from lab.paper.uncertainties import Uncertainties
 from lab.studies import pages
 
 Row = tuple[str, ...]
+TEMPLATES = Path(__file__).with_name("templates")
 FIGURES = "paper"  # directory of the figures beside the Markdown page
 NUMBERED = "P", "C"  # letters of the claims that the paper numbers
 WORDS = {  # what `words.yaml` names beside the fields of a report
@@ -97,7 +96,7 @@ def write_markdown(report: Report, path: Path) -> None:
 
 
 def _template(name: str) -> str:
-    return resources.files(__package__).joinpath("templates", name).read_text(encoding="utf-8")
+    return (TEMPLATES / name).read_text(encoding="utf-8")
 
 
 def _render(name: str, report: Report, *, autoescape: bool, **more: object) -> str:
@@ -106,8 +105,7 @@ def _render(name: str, report: Report, *, autoescape: bool, **more: object) -> s
     filters = {"cell": lambda text: text.replace("|", "\\|"), "told": told.__getitem__}
     return _filled(
         name, filters, autoescape, **report._asdict() | words(report), printed=PRINTED, signs=SIGNS, told=told,
-        summary=summary(report.claims), tables=tables(report.found),
-        origin="Computed with " + ", ".join(f"{name} {version}" for name, version in versions().items()) + ".", **more,
+        summary=summary(report.claims), tables=tables(report.found), stamp=pages.stamp(), **more,
     )
 
 
