@@ -8,9 +8,9 @@ SLOWER ?= 0.3
 export ROS_DOMAIN_ID ?= 42
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
-# Studies that write a page, those first that take longest; what one of them is asked beside.
+# Studies that write a page, those first that take longest; and further arguments of one of them.
 PAGES := derivatives accuracy maps fuzz hard paper faults effects certificate domain
-fuzz_options := --draws 5000 --jobs 2
+fuzz_options := --seed 20261130 --draws 60000 --jobs 2
 
 .PHONY: demo test thorough quick lint install docs study laboratory benchmark mutants lowest clean
 
@@ -43,7 +43,8 @@ install: $(VENV)/ready
 docs: install
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
-# Every page that the laboratory writes, some hours on a quiet machine; one of them with, say, `make study-paper`.
+# Every page that the laboratory writes, but for one table (CONTRIBUTING.md), some hours on a quiet machine; one page
+# with, say, `make study-paper`.
 study: $(PAGES:%=study-%)
 .NOTPARALLEL:
 

@@ -33,7 +33,7 @@ Simulate, run, inspect and draw a grasp that collides.
 {overview()}
 
 `grasp COMMAND --help` says more; `grasp --version` prints the version.
-Begin with `grasp simulate case_01`.
+Begin with `grasp simulate case_01`. A traceback is a bug: please report it.
 """
 
 

@@ -78,7 +78,7 @@ def _map(options: argparse.Namespace) -> int:
     pictures = {column.name: options.output.with_name(f"{options.output.stem}_{column.name}.png") for column in columns}
     for path in pictures.values():
         if os.path.exists(path) and not os.path.exists(options.output):
-            raise Refused(f"{path}: already exists; allowed: an output whose figures beside it are new")
+            raise Refused(f"{path}: already exists; allowed: an output whose figures next to it are new")
     check_fits(f"{scene.name}: runs", plan.rows, 2 * (len(axes) + len(columns)))  # in chunks, and joined
     prepare()
     with bar(plan.rows, "run", scene.name) as progress:

@@ -48,9 +48,9 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--from", dest="first", type=float, metavar="S", help="begin of the time range, in s")
     sub.add_argument("--to", dest="last", type=float, metavar="S", help="end of the time range, in s")
     sub.add_argument("--width", type=float, metavar="MM", help="width of the page (default 230 mm, 90 is a column)")
-    add_file(sub, "FILE", "image, say .png, .svg or .pdf; - is the standard output (default: .png beside the source)")
+    add_file(sub, "FILE", "image, say .png, .svg or .pdf; - is the standard output (default: .png next to the source)")
     sub.add_argument("--animate", action="store_true",
-                     help="a moving picture of one source instead, .gif or .html (default: .gif beside it)")
+                     help="a moving picture of one source instead, .gif or .html (default: .gif next to it)")
     sub.add_argument("--speed", type=float, default=1.0, metavar="R", help="playback speed (default 1)")
 
 

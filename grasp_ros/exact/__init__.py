@@ -1,9 +1,9 @@
 """Exact hybrid integration: every compiled kernel of the method `exact`, and the integrator that drives them.
 
-`integrator` is the door. `driver.advance` joins the segments: `flight` between contacts, `contact` in them; `automaton`
-has the modes of pairs and object and every transition. `records` are the values that all of these hand to each other,
-`compensated` moves a state, `tolerances` has the bounds by which a rounding decides. `numerics` and `compilation` know
-nothing of grasps.
+`integrator` is the entry. `driver.advance` joins the segments: `flight` between contacts, `contact` in them;
+`automaton` has the modes of pairs and object and every transition. `records` are the values that all of these hand to
+each other, `compensated` moves a state, `tolerances` has the bounds by which a rounding decides. `numerics` and
+`compilation` know nothing of grasps.
 """
 
 from __future__ import annotations

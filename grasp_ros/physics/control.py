@@ -21,7 +21,7 @@ from grasp_ros.physics.layout import BLOCK
 from grasp_ros.physics.model import Array
 
 Law = Callable[..., float]  # tick, time in s, measured x in m and v in m/s, what it observes, see `observation`, to N
-FIXED = "allowed: the scene's own number; beside a controller of the user's it is fixed for the run"
+FIXED = "allowed: the scene's own number; with a controller of the user's it is fixed for the run"
 NO_NOISE = np.zeros(2)
 WHOLE = 2.0**53  # from here on every number is a whole one
 

@@ -176,10 +176,10 @@ def _arms(key: str) -> tuple[str, ...]:
 
 RULES = (
     Rule("gap or depth of a pair, in roundings of the largest position", PART, np.inf, "",
-         f"a smaller one cannot be told from 0 beside the positions, nor can one below {SMALLEST:g} m",
+         f"a smaller one cannot be distinguished from 0 next to the positions, nor can one below {SMALLEST:g} m",
          _arms("arm.position_m"), Systems.gaps),
     Rule("relative speed of a pair without a gap, in roundings of the largest speed", PART, np.inf, "",
-         f"a smaller one cannot be told from 0 beside the velocities, nor can one below {SMALLEST:g} m/s",
+         f"a smaller one cannot be distinguished from 0 next to the velocities, nor can one below {SMALLEST:g} m/s",
          _arms("arm.velocity_m_per_s"), Systems.closing),
     Rule("mass of the arm / mass of the object", 1e-12, 1e12, "",
          "four digits are left of the velocity that an impact gives the heavier body", _arms("arm.mass_kg"),

@@ -1,4 +1,4 @@
-"""The doors to a user's files: what the system or a decoder says against one is a refusal that names the path."""
+"""Users' files, read and written: what the system or a decoder says against one is a refusal that names the path."""
 
 from __future__ import annotations
 
@@ -120,12 +120,12 @@ def decoding(path: object, kind: str, refusal: type[Refused] = Refused, also: tu
              ) -> Iterator[None]:
     """Refuse a file that is not what it should be, damaged or of another kind.
 
-    `kind` says what it should be, with its article; `also` what its decoder raises beside DAMAGE.
+    `kind` says what it should be, with its article; `also` what its decoder raises besides DAMAGE.
     """
     try:
         yield
     except DAMAGE + also as error:
-        if isinstance(error, Refused) and str(error).startswith(str(path)):  # a door behind this one has said it all
+        if isinstance(error, Refused) and str(error).startswith(str(path)):  # from further in, with all there is to say
             if isinstance(error, refusal):
                 raise
             raise refusal(str(error)) from None

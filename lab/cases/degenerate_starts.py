@@ -100,7 +100,7 @@ def _symmetric(sketch: Sketch) -> None:
     sketch.v = [towards, 0.0, -towards] if draw.chance(0.7) else [towards, towards, towards]
 
 
-def _surface(sketch: Sketch) -> None:
+def _clamp_surface(sketch: Sketch) -> None:
     """One pair or both start in the contact, separating at exactly 1/p, or a few roundings from it."""
     draw = sketch.draw
     depth = sketch.size * draw.decades(-6.0, 0.0)
@@ -127,5 +127,5 @@ def _apart(sketch: Sketch) -> None:
 
 STARTS: tuple[tuple[str, Callable[[Sketch], None]], ...] = (
     ("chain", _chain), ("rest in contact", _rest), ("zero gaps", _zero_gaps), ("tiny gap", _tiny_gap),
-    ("symmetric", _symmetric), ("surface", _surface), ("both deep", _deep), ("apart", _apart),
+    ("symmetric", _symmetric), ("clamp surface", _clamp_surface), ("both deep", _deep), ("apart", _apart),
 )

@@ -28,7 +28,7 @@ CHAIN = Family(
     "O10 with gaps, O11 without: the speeds after the last impact, m/s",
 )
 CREEP = Family(
-    "creep", "The pair opens along u' = -1/p, so closely that rounding cannot tell it from the surface itself.",
+    "creep", "The pair opens so close to the clamp surface u' = -1/p that rounding cannot distinguish the two.",
     "O2: duration and exit speed, relative; promised are 4 roundings of the speeds, whose difference is 1/p",
 )
 TOUCH = Family(
@@ -40,10 +40,12 @@ GRAZE = Family(
     "reference with 25 digits: speed of the object, relative; promised is the overshoot to 5e-15 m",
 )
 CLAMP = Family(
-    "clamp", "u' = -1/p, the second surface of (10), is crossed in both directions while u > 0, where nothing else"
+    "clamp", "The clamp surface u' = -1/p is crossed in both directions while u > 0, where nothing else"
     " changes sign.", REFERENCE,
 )
-START = Family("start", "The mode at t = 0 must follow from the state alone, also exactly on a surface.", REFERENCE)
+START = Family(
+    "start", "The mode at t = 0 must follow from the state alone, also exactly where modes change.", REFERENCE
+)
 EXTREME = Family(
     "extreme", "Time scales that differ by many decades; some of these scenes amplify errors.", REFERENCE
 )
@@ -65,7 +67,7 @@ HORIZON = Family(
 )
 TAIL = Family(
     "tail", "Bounces get smaller for ever: no stall, no end, amplitudes below 1e-30 m.",
-    "O9: V_c beside its law, relative",
+    "O9: V_c against its law, relative",
 )
 BALANCE = Family(
     "balance", "An error that no single state shows.",

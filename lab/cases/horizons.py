@@ -37,7 +37,7 @@ def _periodic(periods: int, solver: Solver) -> float:
 
 
 def tail(seconds: float, solver: Solver) -> float:
-    """V_c beside its law, relative; contacts that are soft enough for the law to set in at once."""
+    """V_c against its law, relative; contacts that are soft enough for the law to set in at once."""
     C, K, hertzian, mass = 0.7, 15.0, 10.0, 5.0
     scene = grasp([-0.3, 0.0, 0.0, 0.0, 0.5, 0.0], seconds, contact=Contact(hertzian, 0.0), mass=mass)
     V_c = float(energy(scene.system, solver.states(scene, [scene.duration])).V_c[0])

@@ -1,4 +1,4 @@
-"""Condition (10)'s second surface, starts in every mode, and extreme stiffness and mass."""
+"""The clamp surface u' = -1/p of condition (10), starts in every mode, and extreme stiffness and mass."""
 
 from __future__ import annotations
 
@@ -116,5 +116,5 @@ def cases() -> Iterator[Case]:
     for p in (300.0, 1e4):
         squeezed = grasp((-0.3, 0.0, 0.0, 0.0, 0.5, 0.0), 1.0, contact=Contact(1e4, p))
         yield Case(CLAMP, f"squeezed with p = {p:g}", partial(_contacts_and_states, squeezed), 1e-9,
-                   "creeps along the surface, pressed and pulled by springs", limit=Status.STALLED)
+                   "creeps along the clamp surface, pressed and pulled by springs", limit=Status.STALLED)
 

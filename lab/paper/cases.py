@@ -87,16 +87,16 @@ class Figure(NamedTuple):
 FIGURES = (
     Figure(2, "", "Standard parameters"),
     Figure(3, "c = Kv = p = 0", "Marginally stable, perfect elastic collision", ("c", "Kv", "p"), ABSENT,
-           ("O1", "T12")),
-    Figure(4, "c = Kv = 0", "Marginally stable, collision with energy loss", ("c", "Kv"), ABSENT, ("O1",)),
-    Figure(5, "p = 1 s/m", "Standard with larger energy loss in collision", ("p",), LARGER, ("O2",)),
-    Figure(6, "m_l = m_r = 10 kg", "10 times the masses, both manip.", ("m_l", "m_r"), TENFOLD, ("O5",)),
-    Figure(7, "m_l = 10 kg", "10 times the mass, left manip.", ("m_l",), TENFOLD, ("O8",)),
-    Figure(8, "k_l = k_r = 100 N/m", "10 times the stiffness, both manip.", ("k",), TENFOLD, ("O6",)),
-    Figure(9, "c_l = c_r = 2 N s/m", "10 times the damping coef., both manip.", ("c",), TENFOLD, ("O7",)),
-    Figure(10, "Kp_l = Kp_r = 50 N/m", "10 times the position feedback gains", ("Kp",), TENFOLD, ("O10",)),
-    Figure(11, "Kv_l = Kv_r = 5 N s/m", "10 times the velocity feedback gains", ("Kv",), TENFOLD, ("O11",)),
-    Figure(12, "m_o = 50 kg", "10 times the mass, object", ("m_o",), TENFOLD, ("O12",)),
+           ("P1", "T12")),
+    Figure(4, "c = Kv = 0", "Marginally stable, collision with energy loss", ("c", "Kv"), ABSENT, ("P1",)),
+    Figure(5, "p = 1 s/m", "Standard with larger energy loss in collision", ("p",), LARGER, ("P2",)),
+    Figure(6, "m_l = m_r = 10 kg", "10 times the masses, both manip.", ("m_l", "m_r"), TENFOLD, ("P5",)),
+    Figure(7, "m_l = 10 kg", "10 times the mass, left manip.", ("m_l",), TENFOLD, ("P8",)),
+    Figure(8, "k_l = k_r = 100 N/m", "10 times the stiffness, both manip.", ("k",), TENFOLD, ("P6",)),
+    Figure(9, "c_l = c_r = 2 N s/m", "10 times the damping coef., both manip.", ("c",), TENFOLD, ("P7",)),
+    Figure(10, "Kp_l = Kp_r = 50 N/m", "10 times the position feedback gains", ("Kp",), TENFOLD, ("P10",)),
+    Figure(11, "Kv_l = Kv_r = 5 N s/m", "10 times the velocity feedback gains", ("Kv",), TENFOLD, ("P11",)),
+    Figure(12, "m_o = 50 kg", "10 times the mass, object", ("m_o",), TENFOLD, ("P12",)),
 )
 _STARTED: dict[tuple[str, str, Start], Scene] = {}
 

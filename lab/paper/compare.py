@@ -44,7 +44,7 @@ class Comparison(NamedTuple):
     changed: Variant
     higher: bool
     why: str
-    letter: str = ""  # of the parameter behind it, and its values, beside that of the first of the others
+    letter: str = ""  # of the parameter behind it, and its values, in place of that of the first of the others
     values: tuple[float, ...] = ()
     words: tuple[str, ...] = ()  # other measures that the sentence may mean
     others: tuple[Variant, ...] = (FIRST,)  # each decides
@@ -123,7 +123,7 @@ class Comparison(NamedTuple):
             return []
         share = sum(wholly(found, self.higher) for _, found in curve) / len(curve)
         standard = value_of(self.others[0].scene(cases), self.letter)
-        text = f"{self.letter} beside {standard:g}, median ratio of {len(starts)} random starts (95 % interval)"
+        text = f"{self.letter} in place of {standard:g}, median ratio of {len(starts)} random starts (95 % interval)"
         opposite = [value for value, found in curve if wholly(found, not self.higher)]
         pairs = ", ".join(f"{value:g}: {found}" for value, found in curve)
         at, lowest = min(curve, key=lambda point: point[1].middle)

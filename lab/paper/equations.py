@@ -22,7 +22,7 @@ from lab.paper.equation_table import AT_EVENTS, EQUATIONS, Equation
 from lab.paper.sample import Sample, relative
 from lab.reference.grasp import acceleration
 
-CROSSING = ("v_jump_one_sided", "v_jump_symmetric")  # scenes that cross the second surface of (10) with u > 0
+CROSSING = ("v_jump_one_sided", "v_jump_symmetric")  # scenes that cross the clamp surface of (10) with u > 0
 
 
 def motion_equations(sample: Sample) -> dict[str, float]:

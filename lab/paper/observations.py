@@ -147,7 +147,7 @@ HEAVY_OBJECT = (
     "The object has no damper: its energy leaves through the arms, in impacts that move it the less the heavier it is."
 )
 
-OBSERVATIONS = numbered("O", "p. 247, observation", {
+OBSERVATIONS = numbered("P", "p. 247, observation", {
     "Collisions that lose energy stabilise a grasp whose arms have no damping.": [
         LOSSY_IMPACTS,
         Share("The motion of No. 3 settles.", marginal_settles,
@@ -157,7 +157,7 @@ OBSERVATIONS = numbered("O", "p. 247, observation", {
                   "V' is 0 in flight and -2 p H u^(3/2) u'^2 in contact.", (3,), *times("p", 0.1, 1.0, 10.0), base=3)],
     "More energy loss in collisions makes the manipulators converge better.": [
         Comparison("No. 4 settles sooner than No. 1.", "settling", Variant(4), LOWER,
-                   "More of the energy of relative motion is lost in each impact, beside what the dampers take.",
+                   "More of the energy of relative motion is lost in each impact, on top of what the dampers take.",
                    *tenfold("p", 50.0, 100.0), SETTLING)],
     "Linear feedback makes a stable grasp possible.": [
         Universal("V_c never rises under the feedback.", motion.repaired_V_falls,

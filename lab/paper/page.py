@@ -7,7 +7,6 @@ import json
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,20 +15,20 @@ from markupsafe import Markup
 from ruamel.yaml import YAML
 
 from grasp_ros.scene.files import writing
-from grasp_ros.scene.versions import versions
 from lab.paper import arms, beyond, cases, claims, equation_table, knife_edge, measures, scatter, universal
 from lab.paper.claims import Claim, Kind, Verdict, tally
-from lab.paper.doubts import Doubts
 from lab.paper.equation_table import Equation
 from lab.paper.equations import CROSSING
 from lab.paper.printed import PRINTED
 from lab.paper.prints import Compared
 from lab.paper.results import Beyond, tables
+from lab.paper.uncertainties import Uncertainties
 from lab.studies import pages
 
 Row = tuple[str, ...]
+TEMPLATES = Path(__file__).with_name("templates")
 FIGURES = "paper"  # directory of the figures beside the Markdown page
-NUMBERED = "O", "C"  # letters of the claims that the paper numbers
+NUMBERED = "P", "C"  # letters of the claims that the paper numbers
 WORDS = {  # what `words.yaml` names beside the fields of a report
     "math": math, "arms": arms, "beyond": beyond, "cases": cases, "edge": knife_edge, "measures": measures,
     "rule": claims, "scatter": scatter, "table": equation_table, "universal": universal, "kinds": Kind,
@@ -57,7 +56,7 @@ class Report(NamedTuple):
     quantities: tuple[Row, Sequence[Row]]
     equations: Sequence[Equation]
     found: Beyond
-    doubts: Doubts
+    uncertainties: Uncertainties
     replays: Sequence[dict[str, Any]]
     images: Mapping[str, bytes]  # PNG
 
@@ -97,7 +96,7 @@ def write_markdown(report: Report, path: Path) -> None:
 
 
 def _template(name: str) -> str:
-    return resources.files(__package__).joinpath("templates", name).read_text(encoding="utf-8")
+    return (TEMPLATES / name).read_text(encoding="utf-8")
 
 
 def _render(name: str, report: Report, *, autoescape: bool, **more: object) -> str:
@@ -106,8 +105,7 @@ def _render(name: str, report: Report, *, autoescape: bool, **more: object) -> s
     filters = {"cell": lambda text: text.replace("|", "\\|"), "told": told.__getitem__}
     return _filled(
         name, filters, autoescape, **report._asdict() | words(report), printed=PRINTED, signs=SIGNS, told=told,
-        summary=summary(report.claims), tables=tables(report.found),
-        origin="Computed with " + ", ".join(f"{name} {version}" for name, version in versions().items()) + ".", **more,
+        summary=summary(report.claims), tables=tables(report.found), stamp=pages.stamp(), **more,
     )
 
 

@@ -91,6 +91,6 @@ def _edge(rows: Sequence[Edge]) -> Table:
         f"{1e3 * VISIBLE:g} mm after, s":
             f"{row.visible:.2f}" if np.isfinite(row.visible) else f"not in {row.t[-1]:g}",
         "mean growth, 1/s": f"{row.rate:.2f}" if np.isfinite(row.rate) else "",
-        **{f"settled, {offset:g} m beside, s": "never" if np.isinf(time) else f"{time:.2f}"
+        **{f"settled, {offset:g} m away, s": "never" if np.isinf(time) else f"{time:.2f}"
            for offset, time in zip(MOVED, row.settling, strict=True)},
     } for row in rows]

@@ -1,4 +1,4 @@
-"""All statements of the paper: observations O1 to O12, conclusions C1 to C3, running text T1 on."""
+"""All statements of the paper: observations P1 to P12, conclusions C1 to C3, running text T1 on."""
 
 from __future__ import annotations
 

@@ -30,7 +30,6 @@ from lab.paper.cases import (
 )
 from lab.paper.claims import Claim
 from lab.paper.compare import Comparison
-from lab.paper.doubts import doubts
 from lab.paper.equations import equations
 from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import MEASURES
@@ -40,6 +39,7 @@ from lab.paper.quantities import quantities
 from lab.paper.replay import replays
 from lab.paper.results import Beyond
 from lab.paper.statements import STATEMENTS
+from lab.paper.uncertainties import uncertainties
 
 RANDOM_STARTS = 200
 DPI = 220
@@ -78,7 +78,7 @@ def _jobs(cases: Cases, drawn: list[Start]) -> Jobs:
         "chaos": (beyond.chaos, cases, started(cases[2], SYMMETRIC)), "stiffer": (arms.stiffer, cases, drawn),
         "damped": (arms.damped, cases, drawn), "gap": (beyond.gap, cases), "tail": (beyond.tail, cases[1]),
         "stepped": (arms.stepped, cases), "edge": (knife_edge, cases), "equations": (equations, cases),
-        "quantities": (quantities, cases), "doubts": (doubts, cases), "replays": (replays, cases),
+        "quantities": (quantities, cases), "uncertainties": (uncertainties, cases), "replays": (replays, cases),
     }
 
 
@@ -125,7 +125,7 @@ def _curves(cases: Cases, claims: Sequence[Claim]) -> list[beyond_figures.Curve]
     found: dict[Any, beyond_figures.Curve] = {}
     for claim in claims:
         for part, judged in zip(STATEMENTS[claim.key].parts, claim.parts, strict=True):
-            if claim.key.startswith("O") and isinstance(part, Comparison) and part.values:
+            if claim.key.startswith("P") and isinstance(part, Comparison) and part.values:
                 unit = UNIT_OF[part.letter[:2].rstrip("_")]
                 found.setdefault((part.letter, part.measure, part.others[0]), beyond_figures.Curve(
                     f"{claim.key} {part.changed}", f"{part.letter}, {unit}", f"{MEASURES[part.measure].short}, ratio",

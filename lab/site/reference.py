@@ -147,6 +147,7 @@ def statuses() -> str:
     return "\n\n".join([
         "# Exit codes, statuses, events", "## Exit codes of grasp",
         table(("code", "when"), [(f"`{code}`", _cell(text)) for code, text in codes]),
+        "Invalid input prints one line and exits with 2, a failed run with 1. A traceback is a bug: please report it.",
         "## Statuses of a run", "`Status`, by name; the value is the sentence that is printed.",
         table(("name", "value"), [(f"`{own.name}`", own.value) for own in Status]),
         "## Events", "`Transition`, by name and number.", table(("name", "number", "when"), transitions),

@@ -1,7 +1,7 @@
 """What the outside peers have in common.
 
-No outside peer knows condition (10)'s second surface u' = -1/p as an event: it would only cost time in the scenes
-that are measured. Tried and not available as a wheel for these Python versions: numbalsoda.
+No outside peer knows the clamp surface u' = -1/p as an event: it would only cost time in the scenes that are
+measured. Tried and not available as a wheel for these Python versions: numbalsoda.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ KIND = "the journal of a study"
 LARGE = 2**63  # no count of a study is
 MOST_BYTES = 2**26  # of a journal
 T = TypeVar("T")
-PEERS = ("scipy", "scikit-sundae", "heyoka")
+PEERS = ("scipy", "scikit-sundae", "heyoka", "diffrax", "jax", "mujoco-mjx", "torch", "torchdiffeq")
 ADAPTED = {"SUNDIALS": "scikit-sundae"}  # family of a contender: the package, where the names differ
 
 

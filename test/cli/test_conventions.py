@@ -37,6 +37,7 @@ def test_help_is_one_screen_with_every_command(command: Any) -> None:
         assert len(lines) <= 30
         assert max(map(len, lines)) <= 100
         assert {*COMMANDS} <= {line.split()[0] for line in lines if line.startswith("  ")}
+        assert lines[-1].endswith("A traceback is a bug: please report it.")
 
 
 def test_help_is_there_at_once() -> None:

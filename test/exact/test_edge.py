@@ -178,7 +178,7 @@ PUSHED = {"push": 1.0, "object_push": 1.0, "beside_push": 1.0, "stiffness": 2.0}
     (0.0, PRESSING, (2.0, 10.0)), (0.0, {**PRESSING, "push": -12.0}, (2.0, -2.0)),
     (0.2, {**PRESSING, "push": -10.0}, (3.0, 300.0)), (-0.2, {**PRESSING, "push": -10.0}, (3.0, -300.0)),
     (0.0, {**PRESSING, "push": -10.0}, (UNDECIDED, 0.0)),  # the second derivative of the force would decide
-    # at u' = -1/p the force is zero; what pushes the other arm off that surface lets it grow, either way
+    # at u' = -1/p the force is zero; what pushes the other arm off that clamp surface lets it grow, either way
     *((-2.0, {"beside_mode": Pair.CONTACT, "beside_push": push}, (3.0, -5.0 * push)) for push in (-3.0, 3.0)),
     # closed without a force, or with one soon; the fourth derivative is the first of this pair's own
     (0.3, {**PUSHED, "beside_mode": Pair.CLAMPED}, (4.0, -2.0)),

@@ -208,7 +208,7 @@ def test_a_push_is_certain_since_it_exceeds_its_rounding_or_from_the_begin(
     (1e-3, -1.9, 0.5, Pair.CONTACT),
     (1e-3, -2.0, 0.5, Pair.CONTACT),  # u' = -1/p for ever belongs to the contact, (10)
     (1e-3, -2.0000001, 0.5, Pair.CLAMPED),
-    (1e-3, -1e9, 0.0, Pair.CONTACT),  # p = 0: there is no second surface
+    (1e-3, -1e9, 0.0, Pair.CONTACT),  # p = 0: there is no clamp surface
     (0.0, 0.4, 0.5, Pair.CONTACT),
     (0.0, -0.4, 0.5, Pair.OPEN),
     (0.0, -4.0, 0.5, Pair.OPEN),

@@ -166,7 +166,7 @@ def test_a_recording_has_the_numbers_that_another_reader_decodes(tmp_path: Path,
         (JOINT_STATES, "effort", np.zeros(2), "left, object, right; allowed: three numbers of left, object, right"),
         (LYAPUNOV, "position", np.zeros(8), "/lyapunov: 8 numbers; allowed: 9"),
         (LYAPUNOV, "name.0", "vigour", "/lyapunov: vigour, .*; allowed: V, "),
-        (LEFT_CONTACT, "wrench.force.y", 3.0, r"contact/left: a force or torque beside force\.x; allowed: 0"),
+        (LEFT_CONTACT, "wrench.force.y", 3.0, r"contact/left: a force or torque other than force\.x; allowed: 0"),
     ],
 )
 def test_a_tick_that_cannot_be_true_is_refused_and_left_out_of_what_is_recovered(

@@ -28,7 +28,7 @@ OFF = 1.001
 
 @cache
 def _motions() -> list[Sample]:
-    """Those that cross the second surface of (10) on one side and on both, and the standard case."""
+    """Those that cross the clamp surface of (10) on one side and on both, and the standard case."""
     return [Sample(scene) for scene in (load_cases()[1], *map(scenes.load, CROSSING))]
 
 
@@ -108,7 +108,7 @@ def test_every_row_agrees() -> None:
     assert set().union(*(numbers for numbers, _, _, _ in BROKEN)) | BY_CONSTRUCTION == every
 
 
-def test_they_cross_the_second_surface() -> None:
+def test_they_cross_the_clamp_surface() -> None:
     assert [each.crosses for each in _motions()] == [False, True, True]
 
 

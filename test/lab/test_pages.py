@@ -25,16 +25,20 @@ from grasp_ros.methods.registry import EXACT
 from grasp_ros.simulation import GRID_POINTS
 from lab.cases.registry import cases
 from lab.drills.faults import run as faults
-from lab.studies import accuracy, certificate, domain, effects, pages
+from lab.paper import page as paper
+from lab.studies import accuracy, certificate, derivatives, domain, effects, pages
 
 DOCS = Path(__file__).parents[2] / "docs"
 ALLOWED = timedelta(days=30)
 MOTION = ("grasp_ros/physics", "grasp_ros/scene", "grasp_ros/exact", "grasp_ros/simulation")
 MEASURED = {  # what the numbers of a page depend on
-    "accuracy": (*MOTION, "grasp_ros/methods"), "costs": MOTION, "faults": ("grasp_ros/graph", "lab/drills/faults"),
-    "fuzz": (*MOTION, "lab/cases", "lab/oracles"), "hard": (*MOTION, "lab/cases"), "jumps": MOTION,
-    "maps": (*MOTION, "grasp_ros/observe", "grasp_ros/maps"),
+    "accuracy": (*MOTION, "grasp_ros/methods"), "costs": MOTION,
+    "derivatives": (*MOTION, "grasp_ros/sensitivity", "lab/oracles"),
+    "faults": ("grasp_ros/graph", "lab/drills/faults"), "fuzz": (*MOTION, "lab/cases", "lab/oracles"),
+    "hard": (*MOTION, "lab/cases"), "jumps": MOTION, "maps": (*MOTION, "grasp_ros/observe", "grasp_ros/maps"),
+    "paper": (*MOTION, "lab/paper"),
 }
+TEMPLATES = {path.stem: path for path in (*pages.TEMPLATES.iterdir(), *paper.TEMPLATES.glob("*.md"))}
 STAMP = re.compile(r"Measured on (\d{4}-\d\d-\d\d) from commit [0-9a-f]+( with changes)?: .*, python [\d.]+, ")
 
 
@@ -54,36 +58,48 @@ def cells(name: str, head: str) -> list[list[str]]:
     return [line.strip("| ").split(" | ") for line in table.splitlines()[2:]]
 
 
-def words(template: str) -> Iterator[str]:
+def words(template: Path) -> Iterator[str]:
     """What a template says whatever the numbers are, piece by piece."""
-    for node in Environment().parse((pages.TEMPLATES / f"{template}.md").read_text(encoding="utf-8")).body:
+    for node in Environment().parse(template.read_text(encoding="utf-8")).body:
         if isinstance(node, nodes.Output):
             yield from (" ".join(part.data.split()) for part in node.nodes if isinstance(part, nodes.TemplateData))
 
 
 def test_every_template_has_a_page_and_sources() -> None:
-    found = {path.stem for path in pages.TEMPLATES.iterdir()} ^ {*MEASURED, "domain"}
+    found = {*TEMPLATES, "derivatives"} ^ {*MEASURED, "domain"}
     assert not found, f"{found}: MEASURED says, of each template but domain.md, what its numbers depend on"
 
 
-@pytest.mark.parametrize("name", [*sorted(MEASURED), "domain"])
+@pytest.mark.parametrize("name", TEMPLATES)
 def test_a_page_says_what_its_template_says(name: str) -> None:
     text, place = " ".join(page(name).split()), 0
-    for part in words(name):
+    for part in words(TEMPLATES[name]):
         assert part in text[place:], part
         place = text.index(part, place) + len(part)
 
 
 @pytest.mark.parametrize(("name", "sources"), MEASURED.items())
 def test_a_page_is_not_older_than_what_it_measures(name: str, sources: Sequence[str]) -> None:
-    found = STAMP.search(page(name))
+    found = [date.fromisoformat(stamp[1]) for stamp in STAMP.finditer(page(name))]
     assert found, "no date, commit and machine"
     log = ["git", "-C", str(DOCS.parent), "log", "-1", "--format=%cs", "--", *sources]
     try:
         changed = subprocess.run(log, capture_output=True, text=True, check=True).stdout.strip()
     except (FileNotFoundError, subprocess.CalledProcessError):
         pytest.skip("there is no git repository to ask")
-    assert date.fromisoformat(changed) - date.fromisoformat(found[1]) <= ALLOWED, f"python -m lab ... writes {name}.md"
+    assert date.fromisoformat(changed) - min(found) <= ALLOWED, f"python -m lab ... writes {name}.md"
+
+
+def test_every_table_of_derivatives_is_stamped() -> None:
+    tables = {name: page("derivatives").split(f"<!-- {name} -->")[1] for name in derivatives.TABLES}
+    assert [name for name, text in tables.items() if not STAMP.search(text)] == []
+
+
+def test_make_draws_the_random_scenes_of_the_page() -> None:
+    [options] = re.findall(r"^fuzz_options := (.*)$", (DOCS.parent / "Makefile").read_text(encoding="utf-8"), re.M)
+    [command] = re.findall(r"`python -m lab fuzz (--seed .* --docs docs)`", page("fuzz"))
+    drawn = [dict(re.findall(r"--(seed|draws) (\d+)", text)) for text in (options, command)]
+    assert drawn[0] == drawn[1]
 
 
 def test_the_domain_is_that_of_the_code() -> None:

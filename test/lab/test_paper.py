@@ -16,7 +16,6 @@ from lab.oracles.closed_forms import elastic_period
 from lab.paper import arms, beyond
 from lab.paper.cases import FIGURES, SYMMETRIC, load_cases, random_starts, started, with_values
 from lab.paper.claims import Check, Claim, Kind, Part, Verdict
-from lab.paper.doubts import doubts
 from lab.paper.equations import equations
 from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import measure, seconds, settlings
@@ -26,6 +25,7 @@ from lab.paper.replay import COLUMNS, frames, replays
 from lab.paper.scatter import median
 from lab.paper.statements import STATEMENTS
 from lab.paper.symmetry import asymmetry, where_false
+from lab.paper.uncertainties import uncertainties
 
 CASES = load_cases()
 STARTS = random_starts(4)
@@ -116,7 +116,7 @@ def test_times_beyond_what_can_be_known_are_ranges() -> None:
 def test_medians_stand_within_the_scatter_of_all_starts() -> None:
     """The first 15 of 200 starts once printed 0.373, 1.12 and 0.963 for what all give as 0.66, 1.57 and 0.75."""
     starts = random_starts(200)
-    for key, part, value, expected in (("O2", 0, 5.0, 0.660), ("O6", 1, 1000.0, 1.57), ("O10", 1, 100.0, 0.752)):
+    for key, part, value, expected in (("P2", 0, 5.0, 0.660), ("P6", 1, 1000.0, 1.57), ("P10", 1, 100.0, 0.752)):
         swept: Any = STATEMENTS[key].parts[part]
         (_, found), = swept._replace(values=(value,)).curve(CASES, starts)
         assert found.low <= expected <= found.high
@@ -195,8 +195,8 @@ def test_the_papers_own_method_at_plausible_steps() -> None:
     assert fine.error > 1e-3
 
 
-def test_doubts_are_computed() -> None:
-    found = doubts({number: CASES[number] for number in (1, 9, 11)})
+def test_uncertainties_are_computed() -> None:
+    found = uncertainties({number: CASES[number] for number in (1, 9, 11)})
     assert found.input == pytest.approx(25.0, rel=1e-3)
     assert found.force == pytest.approx(1643.0, abs=0.5)
     assert found.even == pytest.approx([9.39, 9.39], abs=0.005)
@@ -243,8 +243,8 @@ def test_a_figure_is_read_and_judged() -> None:
 
 @pytest.mark.slow
 def test_settling_is_counted_in_swings_too() -> None:
-    """O6 and O10 come out the other way, if times are counted in swings of the arm."""
-    for key in ("O6", "O10"):
+    """P6 and P10 come out the other way, if times are counted in swings of the arm."""
+    for key in ("P6", "P10"):
         swept: Any = STATEMENTS[key].parts[1]
         judged = swept._replace(values=(), words=("swings",)).judge(CASES, STARTS)
         assert any("in swings" in check.text for check in judged.turned)

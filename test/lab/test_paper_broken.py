@@ -60,26 +60,26 @@ def verdict(key: str, part: int, cases: Cases, looked_at: tuple[int, ...]) -> Ve
 
 TRUE, NOT_TRUE, NOT_FALSE = (HOLDS, LIMITED), (FAILS,), (HOLDS, LIMITED)
 BREAKS = [
-    Break("O1", 0, TRUE, NOT_TRUE, 3, {"p": 0.0}),
-    Break("O1", 1, TRUE, NOT_TRUE, 3, {"p": 0.0}),
-    Break("O2", 0, TRUE, NOT_TRUE, 4, {"p": 0.01}),
-    Break("O3", 1, TRUE, NOT_TRUE, 1, LOSSLESS),
-    Break("O5", 0, NOT_TRUE, NOT_FALSE, 5, {"m": 0.1}),
-    Break("O5", 1, TRUE, NOT_TRUE, 5, {"m": 0.1}),
-    Break("O6", 0, TRUE, NOT_TRUE, 7, {"k": 1.0}),
-    Break("O6", 1, NOT_TRUE, NOT_FALSE, 7, {"m": 10.0}),
-    Break("O7", 0, TRUE, NOT_TRUE, 8, {"c": 0.02}),
-    Break("O8", 0, TRUE, NOT_TRUE, 6, {"m_l": 1.0}),
-    Break("O8", 1, TRUE, NOT_TRUE, 6, {"m_l": 1.0}),
-    Break("O9", 0, TRUE, NOT_TRUE, 9, {"Kp": 5.0}),
-    Break("O9", 1, TRUE, NOT_TRUE, 10, {"Kv": 0.5}),
-    Break("O10", 0, TRUE, NOT_TRUE, 9, {"Kp": 0.5}),
-    Break("O10", 1, NOT_TRUE, NOT_FALSE, 9, {"m": 10.0}),
-    Break("O10", 2, TRUE, NOT_TRUE, 9, {"Kv": 50.0}),
-    Break("O11", 0, TRUE, NOT_TRUE, 10, {"Kv": 0.05}),
-    Break("O11", 1, TRUE, NOT_TRUE, 10, {"Kv": 0.05}),
-    Break("O12", 0, TRUE, NOT_TRUE, 11, {"m_o": 0.5}),
-    Break("O12", 1, TRUE, NOT_TRUE, 11, {"m_o": 0.5}),
+    Break("P1", 0, TRUE, NOT_TRUE, 3, {"p": 0.0}),
+    Break("P1", 1, TRUE, NOT_TRUE, 3, {"p": 0.0}),
+    Break("P2", 0, TRUE, NOT_TRUE, 4, {"p": 0.01}),
+    Break("P3", 1, TRUE, NOT_TRUE, 1, LOSSLESS),
+    Break("P5", 0, NOT_TRUE, NOT_FALSE, 5, {"m": 0.1}),
+    Break("P5", 1, TRUE, NOT_TRUE, 5, {"m": 0.1}),
+    Break("P6", 0, TRUE, NOT_TRUE, 7, {"k": 1.0}),
+    Break("P6", 1, NOT_TRUE, NOT_FALSE, 7, {"m": 10.0}),
+    Break("P7", 0, TRUE, NOT_TRUE, 8, {"c": 0.02}),
+    Break("P8", 0, TRUE, NOT_TRUE, 6, {"m_l": 1.0}),
+    Break("P8", 1, TRUE, NOT_TRUE, 6, {"m_l": 1.0}),
+    Break("P9", 0, TRUE, NOT_TRUE, 9, {"Kp": 5.0}),
+    Break("P9", 1, TRUE, NOT_TRUE, 10, {"Kv": 0.5}),
+    Break("P10", 0, TRUE, NOT_TRUE, 9, {"Kp": 0.5}),
+    Break("P10", 1, NOT_TRUE, NOT_FALSE, 9, {"m": 10.0}),
+    Break("P10", 2, TRUE, NOT_TRUE, 9, {"Kv": 50.0}),
+    Break("P11", 0, TRUE, NOT_TRUE, 10, {"Kv": 0.05}),
+    Break("P11", 1, TRUE, NOT_TRUE, 10, {"Kv": 0.05}),
+    Break("P12", 0, TRUE, NOT_TRUE, 11, {"m_o": 0.5}),
+    Break("P12", 1, TRUE, NOT_TRUE, 11, {"m_o": 0.5}),
     Break("C1", 0, TRUE, NOT_TRUE, 1, {"p": 30.0}),
     Break("C1", 1, TRUE, NOT_TRUE, 1, {"p": 30.0}),
     Break("C1", 2, TRUE, NOT_TRUE, 1, {"p": 30.0}),
@@ -100,7 +100,7 @@ BREAKS = [
     Break("T12", 1, NOT_TRUE, NOT_FALSE, 2, {"m_o": 1e9, "H": 1e12}),
 ]
 FALLING = [  # that V, V_c or V' does not rise; no number that a scene accepts breaks it
-    ("O1", 2, 3), ("O3", 0, 1), ("O4", 0, 5), ("O4", 1, 7), ("O4", 2, 8), ("O4", 3, 11), ("C1", 0, 1), ("C1", 3, 4),
+    ("P1", 2, 3), ("P3", 0, 1), ("P4", 0, 5), ("P4", 1, 7), ("P4", 2, 8), ("P4", 3, 11), ("C1", 0, 1), ("C1", 3, 4),
     ("T1", 0, 1),
 ]
 OTHERS = {"T2", "T4", "T6", "T9"}  # each has a test below
@@ -156,14 +156,14 @@ def test_an_object_that_moves_does_not_rest() -> None:
 
 
 def test_a_grasp_that_does_not_press_is_a_limit() -> None:
-    """O3 once held, where T9, the grasp itself, does not."""
-    assert verdict("O3", 2, CASES, ()) is LIMITED
-    assert verdict("O3", 2, dict.fromkeys(CASES, scenes.load("preload")), ()) is HOLDS
+    """P3 once held, where T9, the grasp itself, does not."""
+    assert verdict("P3", 2, CASES, ()) is LIMITED
+    assert verdict("P3", 2, dict.fromkeys(CASES, scenes.load("preload")), ()) is HOLDS
 
 
 def test_a_ratio_over_nothing_decides_nothing() -> None:
-    """O8: equal arms from a symmetric start do not differ at all; 0.9233 against 0 once counted as true."""
-    part = STATEMENTS["O8"].parts[0].judge(CASES, STARTS)
+    """P8: equal arms from a symmetric start do not differ at all; 0.9233 against 0 once counted as true."""
+    part = STATEMENTS["P8"].parts[0].judge(CASES, STARTS)
     trivial = [check for check in part.checks if check.kind is Kind.TRIVIAL]
     assert trivial
     assert all("against 0: no ratio" in check.value for check in trivial)

@@ -27,7 +27,7 @@ SIGNS = {"holds": "\u2713", "holds within stated limits": "~", "does not hold": 
 CONTENT = (
     "The answer", "Judgement", "Replay", "Figures 2 to 12", "Quantities", "Equations (1) to (37)",
     "What the paper could not show",
-    "Doubts about the source", "Definitions",
+    "Uncertainties in the source", "Definitions",
 )
 
 
@@ -52,7 +52,7 @@ def test_the_page_needs_nothing_else(made: Path) -> None:
         assert f">{title}</h2>" in text
     assert not re.findall(r'(?:src|href)="(?!data:|#)[^"]*"', text)
     assert "@import" not in text
-    assert all(f'id="{key}"' in text for key in ("O1", "O12", "C3", "T12", "fig2", "fig12"))
+    assert all(f'id="{key}"' in text for key in ("P1", "P12", "C3", "T12", "fig2", "fig12"))
     runs = json.loads(re.findall(r'<script id="runs" type="application/json">(.*?)</script>', text, re.S)[0])
     assert len(runs) == 11
     assert len(text.encode()) < LARGEST

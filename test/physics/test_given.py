@@ -1,4 +1,4 @@
-"""What Python users hold in their hands: taken, or refused in a sentence at the door."""
+"""What Python users hold in their hands: taken, or refused in a sentence before anything is computed."""
 
 from __future__ import annotations
 

@@ -6,6 +6,8 @@ What is made while the site is built, figures of examples, `test_pages.py` looks
 from __future__ import annotations
 
 import re
+import tomllib
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -45,6 +47,16 @@ def test_links_lead_somewhere(page: Path) -> None:
     for path, anchor in links(page):
         assert path.exists() or (drawn and path.suffix == ".png"), path
         assert not anchor or anchor in anchors(path), (path, anchor)
+
+
+def test_the_readme_has_every_package_and_extra() -> None:
+    """Of what a table of pyproject.toml names; pytest-xdist, say, is under pytest."""
+    listed = README.read_text(encoding="utf-8").split("## Packages, and why")[1].split("\n## ")[0].lower()
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    packages = " ".join([*project["dependencies"], *chain(*extras.values())]).lower()
+    names = re.findall(r"(?:^| )(?!grasp_ros)(?:types-)?(ros-[\w-]+|[\w.]+)", packages)
+    assert [name for name in [*names, *(f"`{extra}`" for extra in extras)] if name not in listed] == []
 
 
 def test_every_page_and_picture_can_be_reached() -> None:

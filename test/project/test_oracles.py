@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from lab.cases.registry import cases
+from lab.paper.statements import STATEMENTS
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "oracles.md"
@@ -42,6 +43,11 @@ def test_every_number_that_is_used_is_defined() -> None:
     used = {name: path for path in SEARCHED for name in NUMBER.findall(path.read_text(encoding="utf-8"))}
     assert len(used) > 10
     assert {name: path for name, path in used.items() if name not in SECTIONS} == {}
+
+
+def test_no_statement_of_the_paper_has_the_name_of_an_oracle() -> None:
+    assert SECTIONS.keys().isdisjoint(STATEMENTS)
+    assert not NUMBER.findall((ROOT / "docs" / "paper.md").read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("name", SECTIONS)

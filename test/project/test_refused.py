@@ -1,4 +1,4 @@
-"""Nothing but a refusal is raised for input, and the doors to files turn what comes through them into one."""
+"""Nothing but a refusal is raised for input, and what opens or decodes a file turns its errors into one."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ def test_nothing_else_is_raised_for_input() -> None:
     }
 
 
-@pytest.mark.parametrize("door", [reading, writing])
-def test_a_door_names_the_path_and_lets_faults_through(door: Any) -> None:
-    with pytest.raises(Refused, match=r"^my file: cannot be \w+: No such file or directory$"), door("my file"):
+@pytest.mark.parametrize("opens", [reading, writing])
+def test_an_opened_file_names_its_path_and_lets_faults_through(opens: Any) -> None:
+    with pytest.raises(Refused, match=r"^my file: cannot be \w+: No such file or directory$"), opens("my file"):
         Path("no/such/file").read_bytes()
-    with pytest.raises(scenes.SceneError), door("my file", scenes.SceneError):
+    with pytest.raises(scenes.SceneError), opens("my file", scenes.SceneError):
         raise PermissionError(13, "Permission denied")
-    with pytest.raises(KeyError), door("my file"):
+    with pytest.raises(KeyError), opens("my file"):
         raise KeyError("ours")
     with pytest.raises(BrokenPipeError), writing("my file"):
         raise BrokenPipeError

@@ -250,7 +250,7 @@ class BagReader:
         if topic.type == topics.FORCE:  # of a command only its force is read, whoever sends it; others have no more
             force, torque = message.wrench.force, message.wrench.torque
             if topic not in topics.COMMANDS.values() and any((force.y, force.z, torque.x, torque.y, torque.z)):
-                raise BagError(f"{name}: a force or torque beside force.x; allowed: 0")
+                raise BagError(f"{name}: a force or torque other than force.x; allowed: 0")
         numbers = [force.x] if topic.type == topics.FORCE else message.position
         if topic == topics.JOINT_STATES:
             lists = message.position, message.velocity, message.effort

@@ -234,7 +234,7 @@ class PeerNode(GraspNode):
             self._texts.remove(entry)
             if beat is None and name in self._held:  # it has given way
                 self._held.remove(name)
-            elif beat is None and not self._is_foreign(topic):
+            elif beat is None and not self._is_from_another_program(topic):
                 self.refuse("refused texts", topic)
             elif (known := (name, beat.identity if beat else "")) != self._taken.get(topic) or beat is None:
                 self._taken[topic] = known
@@ -244,8 +244,8 @@ class PeerNode(GraspNode):
         """Whether a source of a topic has just ended: no heartbeat has the digests of its texts any more."""
         return any(beat.ended for beat in self.heartbeats.of(self.sources(topic)))
 
-    def _is_foreign(self, topic: Topic) -> bool:
-        """Whether a text may be of a plant of another make: no heartbeat has any digest, and it publishes states."""
+    def _is_from_another_program(self, topic: Topic) -> bool:
+        """Whether a text may be of a plant of another program: no heartbeat has any digest, and it publishes states."""
         names = set(self.sources(topic))
         return bool(names) and names <= {*self.sources(JOINT_STATES)} and not any(
             beat.texts for beat in self.heartbeats.alive

@@ -35,7 +35,7 @@ from grasp_ros.scene.versions import versions
 MOST_TICKS, MOST_SECONDS = 128, 0.05  # that are evaluated at once, and of wall time that a tick waits for others
 BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what came before a signal; without more when all have ended
 LOOK_SECONDS = 0.01  # between looks for commands that are missing at the end
-MOST_BESIDE_BYTES = 2**24  # beside the states: of a topic from report to report
+MOST_OTHER_BYTES = 2**24  # of a topic that does not come with every state, from report to report
 DIAGNOSTICS_LEFT_OUT = "diagnostics not recorded"  # which anybody on the host may send
 
 
@@ -57,7 +57,7 @@ class Monitor(PeerNode):
         self._others: list[Subscription] = []  # of what does not come with every state
         self._published, self._advanced = b"", 0.0  # for the last tick, and the wall time at which it came
         self._early: deque[tuple[Topic, bytes]] = deque(maxlen=1000)  # what comes beside before the first state
-        self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
+        self._other_bytes: Counter[Topic] = Counter()  # of `_others`, since the last report
         self._plant, self._at_end = "", False  # identity of the one that is recorded; whether its last tick is
         self._sources: dict[Topic, Sources] = {}  # of commands that come with every state
         self._acted = [0.0, 0.0, 0.0]  # N by body, in the last state
@@ -149,12 +149,12 @@ class Monitor(PeerNode):
 
     def _record(self, topic: Topic, cdr: bytes) -> None:
         """Keep what does not come with every state, at the time of the last one, as long as it is not too much."""
-        self._beside[topic] += len(cdr)
+        self._other_bytes[topic] += len(cdr)
         if topic in self._commands:
             self._commands[topic].append((raw_command(cdr) or (0, 0.0))[1])
             self.heartbeats.confirm(topic.name)
             self._let_wait()
-        if len(cdr) > MOST_BYTES or self._beside[topic] > MOST_BESIDE_BYTES:
+        if len(cdr) > MOST_BYTES or self._other_bytes[topic] > MOST_OTHER_BYTES:
             self.refuse(DIAGNOSTICS_LEFT_OUT if topic == topics.DIAGNOSTICS else NOT_RECORDED, topic)
         elif self._due:
             self._due[-1][2].append((topic, cdr))
@@ -194,7 +194,7 @@ class Monitor(PeerNode):
     def report(self) -> None:
         """Publish the counters."""
         super().report()
-        self._beside.clear()
+        self._other_bytes.clear()
 
     def _take(self, tick: Tick) -> None:
         """Put a tick in its place in the bag's time; evaluate what waits once there is enough, or something changes."""

@@ -28,9 +28,9 @@ def _force(side: int, system: System, _: int, state: Array) -> float:
 
 
 def _odd(side: str, sections: Sections, system: System) -> Iterable[str]:
-    """An arm may start inside the object, as every state of a run may be a start, but hardly beyond its other side.
+    """Suspicious: an arm beyond the object, deeper in it than motion and forces press, or that passes through it.
 
-    And where one arm hits the object, the other one is hardly meant to pass through it.
+    Every state of a run may be a start, so that an arm may be inside the object.
     """
     at, far = SIDES[side], "right" if side == "left" else "left"
     if f"{far}_arm" in sections and SIDES[far] not in system.contacts:

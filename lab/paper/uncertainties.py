@@ -1,4 +1,4 @@
-"""Numbers behind what is doubtful in the source."""
+"""Numbers behind what is uncertain in the source."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lab.paper.measures import measure, seconds, settlings
 from lab.reference.grasp import grasp_of
 
 
-class Doubts(NamedTuple):
+class Uncertainties(NamedTuple):
     """What follows from readings of the source."""
 
     input: float  # N, the largest of No. 9
@@ -27,7 +27,7 @@ class Doubts(NamedTuple):
     odd: list[float]  # from the printed one
 
 
-def doubts(cases: Cases) -> Doubts:
+def uncertainties(cases: Cases) -> Uncertainties:
     """All of them."""
     standard = cases[STANDARD]
     literal = started(standard, LITERAL)
@@ -38,5 +38,5 @@ def doubts(cases: Cases) -> Doubts:
         [measure(started(cases[number], start), "settling") for number in (STANDARD, 11)]
         for start in (SYMMETRIC, NEARLY, PRINTED)
     )
-    return Doubts(measure(cases[9], "input"), force, levels[0], levels[1], times, seconds(settlings(standard)), even,
-                  near, odd)
+    return Uncertainties(measure(cases[9], "input"), force, levels[0], levels[1], times, seconds(settlings(standard)),
+                         even, near, odd)

@@ -1,4 +1,4 @@
-"""Files from strangers: none may end in a traceback, a hang or gigabytes, or be taken for valid."""
+"""Damaged and malicious files: none may end in a traceback, a hang or gigabytes, or be taken for valid."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from grasp_ros.scene.strict_yaml import MOST_NODES
 from grasp_ros.simulation import plots, simulate
 from lab.studies.records import Journal, digest
 
-SECONDS = 10.0  # of this process; no door takes longer
+SECONDS = 10.0  # of this process; no reader takes longer
 CASE = scenes.load("case_01").to_yaml()
 DURATION = "duration_s: 20.0"
 
