@@ -135,7 +135,7 @@ class Lockstep:
             self.advance()
 
     def _count_more(self, counter: str, topic: Topic, stamp_ns: int) -> None:
-        """Count an answer that is one too many; name its sources unless the state was published again for others."""
+        """Count an answer that is one too many, and say whose; not where the state was published again, which asks."""
         if stamp_ns == self._asked_ns:
             self._plant.count(counter)
         else:
