@@ -206,11 +206,11 @@ COMMANDS = (
         add_scene, SEED,
         _asked("--calls", dest="times", type=whole(1), default=1000, metavar="N", help="how many (default 1000)"),
     )),
-    Command("faults", "accidents done to graphs of real processes, some minutes", _faults, (
-        _asked("--only", nargs="+", default=[], metavar="NAME", help="these drills alone"),
-        _asked("--quick", action="store_true", help="a handful of drills"),
+    Command("faults", "fault injection: accidents done to graphs of real processes, some minutes", _faults, (
+        _asked("--only", nargs="+", default=[], metavar="NAME", help="these faults alone"),
+        _asked("--quick", action="store_true", help="a handful of faults"),
         _asked("--ticks", type=whole(1000), metavar="N",
-               help=f"in place of drills, {LONG_SCENE} in lockstep for N ticks: losses, and memory of processes"),
+               help=f"in place of faults, {LONG_SCENE} in lockstep for N ticks: losses, and memory of processes"),
     ), "faults"),
     Command("readers", "damaged files of all kinds against their readers", _readers, (
         _asked("--seconds", type=float, help=SECONDS.format("--count")),

@@ -118,7 +118,7 @@ def topics(title: str, points: Sequence[Point], limits: Sequence[Limit]) -> dict
     """What accuracy costs over topics, and where the sampled loop loses stability."""
     rows = []
     for point in points:
-        walls = ["-" if w is None else f"{w:.3g}" for w in (point.one_process, point.four_processes, point.bare)]
+        walls = ["-" if w is None else f"{w:.3g}" for w in (point.one_process, point.four_processes, point.baseline)]
         rows.append([f"{point.period_ms:g} ms", f"{point.deviation:.1e} m", *walls])
     finest = points[-4:]
     order = np.polyfit(np.log([p.period_ms for p in finest]), np.log([p.deviation for p in finest]), 1)[0]

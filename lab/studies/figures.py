@@ -160,7 +160,7 @@ def control_period(points: Sequence[Point], name: str, path: Path) -> None:
         ("one process", [point.one_process for point in points], {"color": "#0072b2", "marker": "o"}),
         ("four processes, with bag and monitor", [point.four_processes for point in points],
          {"color": "#d55e00", "marker": "s"}),
-        ("bare rclpy: the same messages and nothing else", [point.bare for point in points],
+        ("bare rclpy: the same messages and nothing else", [point.baseline for point in points],
          {"color": "#888888", "marker": "^", "linestyle": "--"}),
     ):
         there = [(p, value) for p, value in zip(period, values, strict=True) if value is not None]

@@ -31,7 +31,7 @@ def our_speed(scene: Scene) -> float:
         return _speed(graph.processes["plant"])
 
 
-def bare_speed(ticks: int) -> float:
+def baseline_speed(ticks: int) -> float:
     """Ticks per second of the same graph on plain rclpy."""
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     started = [

@@ -23,7 +23,7 @@ from lab.studies.records import Journal, origin, scene_key
 PERIODS_MS = (20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1)
 GRAPH_PERIODS_MS = (20.0, 5.0, 1.0, 0.5, 0.1)
 COMMON_S = 0.02  # the deviation is looked at where all periods have a tick
-PAIRS = 2  # of runs, bare and ours in turn; the fastest counts
+PAIRS = 2  # of runs, baseline and ours in turn; the fastest counts
 TICKS = 1000  # of a graph; its speed does not depend on how far it goes
 
 
@@ -34,7 +34,7 @@ class Point(NamedTuple):
     deviation: float  # largest distance of a position from continuous feedback, m
     one_process: float  # wall seconds per simulated second
     four_processes: float | None  # None: not measured at this period
-    bare: float | None
+    baseline: float | None
 
 
 def run(scene: Scene, directory: Path, graph_periods: tuple[float, ...] = GRAPH_PERIODS_MS) -> list[Point]:
@@ -62,10 +62,10 @@ def _measure(scene: Scene, period_ms: float, grid: Any, ideal: Any, with_graph: 
     begin = time.perf_counter()
     state = simulation.simulate(sampled, grid=grid, sampled=True).state
     one = (time.perf_counter() - begin) / scene.duration
-    four = bare = None
+    four = baseline = None
     if with_graph:
         short = sampled.changed({"time.duration_s": TICKS * round(period_ms * 1e6) / 1e9})
         per_tick = 1e3 / period_ms  # ticks per simulated second
-        pairs = [(graph.bare_speed(TICKS), graph.our_speed(short)) for _ in range(PAIRS)]
-        bare, four = (per_tick / max(speeds) for speeds in zip(*pairs, strict=True))
-    return Point(period_ms, float(np.abs(state - ideal)[:, ::2].max()), one, four, bare)
+        pairs = [(graph.baseline_speed(TICKS), graph.our_speed(short)) for _ in range(PAIRS)]
+        baseline, four = (per_tick / max(speeds) for speeds in zip(*pairs, strict=True))
+    return Point(period_ms, float(np.abs(state - ideal)[:, ::2].max()), one, four, baseline)

@@ -34,7 +34,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from grasp_ros.graph import bag
-from grasp_ros.graph.health.heartbeat import Heartbeat, Heartbeats
+from grasp_ros.graph.health.heartbeat import Heartbeat, Heartbeats, digest
 from grasp_ros.graph.health.peers import Need
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.ros import messages
@@ -248,6 +248,19 @@ def test_only_who_has_said_so_has_ended(make: Any) -> None:
         node.heartbeats._on_beat(String(data=json.dumps({**SIGN, "ended": last})))
         trouble = node._trouble_with(Need(JOINT_STATES), time.monotonic())
         assert trouble.words == f"joint_states: /plant {words}"
+
+
+def test_a_refused_text_names_who_was_a_source_when_it_came(
+    make: Any, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """It waits for a digest; whoever has sent it may be gone by then, and the plant still there."""
+    node = make(Controller, "left_controller", peer_timeout_s=0.2)
+    node.heartbeats._on_beat(String(data=json.dumps({**SIGN, "texts": [digest("a scene")]})))
+    monkeypatch.setattr(node, "sources", lambda _: ["/plant", "/stray"])
+    node._on_text(RUNNING, print, String(data="no run"))
+    monkeypatch.setattr(node, "sources", lambda _: ["/plant"])
+    wait_for(lambda: node.heard() or not node._texts, "the refusal")
+    assert "run: refused texts: 1; sources seen: /plant and /stray\n" in capfd.readouterr().err
 
 
 def test_a_node_whose_name_goes_before_its_topics_is_named(make: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -37,6 +37,7 @@ from grasp_ros.graph.nodes.plant import Plant
 from grasp_ros.graph.parameters import FREE, NODES
 from grasp_ros.graph.ros.messages import State
 from grasp_ros.graph.serialization import list_message
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT
 from grasp_ros.scene.topics import CHANGES, NAMED_LIST
 from grasp_ros.simulation import simulate
@@ -185,6 +186,13 @@ def test_the_laws_of_two_resets_in_a_row_each_act_in_their_run() -> None:
     monitor.restart()
     announce(5.0)
     assert acting() == [5.0]
+
+
+def test_an_announcement_with_a_number_missing_is_refused_in_words() -> None:
+    arm = scene.load("arm_alone")
+    numbers = [*arm.numbers_of("left_controller")]
+    with pytest.raises(Refused, match=f"left/parameters: {len(numbers)} names, 1 numbers"):
+        LyapunovMonitor(arm).announce("left", list_message(0, numbers, [1.0]))
 
 
 def test_an_announcement_that_is_lost_is_seen_in_the_bag(tmp_path: Path) -> None:

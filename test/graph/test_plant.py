@@ -23,7 +23,10 @@ from std_msgs.msg import String
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
+from grasp_ros.graph.nodes.plant import Plant
 from grasp_ros.graph.ros import messages
+from grasp_ros.graph.serialization import force_message
+from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, SCENE
 from grasp_ros.simulation import simulate
 from lab.drills.nodes import plain_messages
@@ -175,7 +178,7 @@ def test_a_second_clock_is_named(launch: Any, node: Any, reliability: Any) -> No
     """Of any quality of service: readers of time take it."""
     node[0].create_publisher(Clock, "/clock", QoSProfile(depth=1, reliability=reliability))
     plant = launch(*node_command("plant", scene="arm_alone"), stderr=subprocess.PIPE)
-    words = "; sources: /peer and /plant; use_sim_time jumps between their times\n"
+    words = "; sources seen: /peer and /plant; use_sim_time jumps between their times\n"
     said = any("/clock: second sources: " in line and line.endswith(words) for line in plant.stderr)
     plant.terminate()
     plant.communicate(timeout=DEADLINE)
@@ -211,3 +214,22 @@ def test_plant_drops_what_is_stale_repeated_or_not_finite(launch: Any, node: Any
     assert plant.returncode == 0
     assert np.array_equal(states, expected.state)
     assert scene.parse(scenes[0], "scene", "topic").values == expected.scene.values
+
+
+def test_who_answers_a_state_that_was_published_again_is_not_blamed(
+    make: Any, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """It was published again for somebody else."""
+    plant = make(Plant, scene="case_01", wait_for_monitor=False)
+    plant.begun, loop, (left, right) = True, plant.loop, plant.scene.controllers.values()
+    first, second = (force_message(tick * plant.scene.period_ns, 0.0) for tick in (0, 1))
+    loop._on_command(LEFT, left, first)
+    loop._repeat(1.0)
+    loop._on_command(LEFT, left, first)
+    loop._on_command(RIGHT, right, first)
+    loop._on_command(RIGHT, right, first)
+    assert plant.tick == plant.counters["repeated commands"] == plant.counters["stale commands"] == 1
+    assert "commands" not in capfd.readouterr().err
+    for _ in range(2):
+        loop._on_command(LEFT, left, second)
+    assert "left/effort_command: repeated commands: 2; sources seen: " in capfd.readouterr().err

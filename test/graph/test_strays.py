@@ -102,7 +102,7 @@ def test_a_command_beyond_the_actuator_is_named_and_does_not_act(
     run = grasp_run("saturation", "--set", "time.duration_s=3.0", "--without", "left_controller", "--no-figure", *kind)
     launch(*stranger("hard", HARD, answers=True), stderr=subprocess.DEVNULL)
     _, err = ended(run)
-    assert re.search(r"left/effort_command: commands beyond a limit: 1; sources: .*; -1000 N; allowed by the", err)
+    assert re.search(r"left/effort_command: commands beyond a limit: 1; sources seen: .*; -1000 N; allowed by the", err)
     recording = whole(tmp_path / "run" / "bag")
     assert set(recording.effort[:, LEFT]) <= {0.0, 0.25}
 
@@ -213,7 +213,7 @@ def test_a_rogue_at_full_speed_on_every_other_topic_costs_no_tick(launch: Any, g
     out, err = ended(run)
     assert "8001 states follow from the recorded inputs, bit for bit" in out
     for words in ("contact/left: messages with a wrong stamp", "scene: refused texts", "lyapunov: refused records"):
-        assert re.search(rf"{words}: \d+; sources: .*(/rogue|not known yet)", err), err
+        assert re.search(rf"{words}: \d+; sources seen: .*(/rogue|not known yet)", err), err
     found = whole(tmp_path / "run" / "bag")
     assert int(found.lost["messages with a wrong stamp"]) > 100
     assert found.size < 20e6
@@ -225,5 +225,5 @@ def test_a_text_that_no_plant_vouches_for_starts_nothing(launch: Any, tmp_path: 
     publisher.publish(String(data="no scene"))
     with (tmp_path / "log").open("w") as log:
         controller = launch(*START, "left_controller", stderr=log)
-    wait_for(lambda: "scene: refused texts: 1; sources: /peer" in (tmp_path / "log").read_text(), "the refusal")
+    wait_for(lambda: "scene: refused texts: 1; sources seen: /peer" in (tmp_path / "log").read_text(), "the refusal")
     assert controller.poll() is None

@@ -64,8 +64,8 @@ class PeerNode(GraspNode):
         self._left: tuple[Phase, str] | None = None  # what it did before a peer ended without which it stays
         self._gone: dict[Topic, float] = {}
         self._last: dict[Topic, list[str]] = {}  # names of the last sources
-        # Texts that wait: since when, on which topic, and who takes them.
-        self._texts: list[tuple[float, Topic, str, Callable[[str], None]]] = []
+        # Texts that wait: since when, on which topic, from which sources, and who takes them.
+        self._texts: list[tuple[float, Topic, list[str], str, Callable[[str], None]]] = []
         self._taken: dict[Topic, tuple[str, str]] = {}  # digest, and who said it
         self._held: set[str] = set()  # digests of texts that wait until another plant has ended
         self.counters.update({"silent peers": 0, "refused texts": 0, "second sources": 0})
@@ -216,13 +216,13 @@ class PeerNode(GraspNode):
         if len(message.data) > TEXT_BYTES or sum(own == topic for _, own, *_ in self._texts) >= MOST_TEXTS:
             self.refuse("refused texts", topic)
             return
-        self._texts.append((time.monotonic(), topic, message.data, take))
+        self._texts.append((time.monotonic(), topic, self.sources(topic), message.data, take))
         self.heard()
 
     def heard(self) -> None:
         """Take the texts whose digest a heartbeat has by now; refuse those that have waited in vain."""
         for entry in tuple(self._texts):
-            when, topic, text, take = entry
+            when, topic, names, text, take = entry
             name = digest(text)
             beat, before = self.heartbeats.sender_of(name), self._taken.get(topic, ("", ""))[1]
             if beat and before not in ("", beat.identity) and not self.heartbeats.successor(before):
@@ -235,7 +235,7 @@ class PeerNode(GraspNode):
             if beat is None and name in self._held:  # it has given way
                 self._held.remove(name)
             elif beat is None and not self._is_from_another_program(topic):
-                self.refuse("refused texts", topic)
+                self.refuse("refused texts", topic, names=names)
             elif (known := (name, beat.identity if beat else "")) != self._taken.get(topic) or beat is None:
                 self._taken[topic] = known
                 take(text)

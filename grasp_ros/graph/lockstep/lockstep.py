@@ -37,7 +37,7 @@ class Lockstep:
         self._plant, self._steering = plant, steering
         self._commands: dict[int, float] = {}
         self.answered = False  # whether a state of this run was
-        self._asked = 0.0  # wall time of the last repetition
+        self._asked, self._asked_ns = 0.0, -1  # wall time of the last repetition, and the stamp of its state
         self._timer: Any = None
         plant.counters.update({
             "stale commands": 0, "repeated commands": 0, "refused commands": 0, "commands beyond a limit": 0,
@@ -88,7 +88,7 @@ class Lockstep:
             self._repeat(now)
 
     def _repeat(self, now: float) -> None:
-        self._asked = now
+        self._asked, self._asked_ns = now, self._plant.tick * self._plant.scene.period_ns
         self._plant.count("repeated states")
         self._plant.repeat()
 
@@ -124,15 +124,22 @@ class Lockstep:
         if command is None:
             self._plant.refuse("refused commands", topic)
         elif not self._plant.begun or command[0] != self._plant.tick * self._plant.scene.period_ns:
-            self._plant.refuse("stale commands", topic)
+            self._count_more("stale commands", topic, command[0])
         elif side in self._commands:
-            self._plant.refuse("repeated commands", topic)
+            self._count_more("repeated commands", topic, command[0])
         elif topic in self._unsettled or not self._sources[topic].settled():  # it is asked for again
             self._unsettled.setdefault(topic, time.monotonic())
             self._plant.refuse("commands while sources change", topic)
         elif self._limits.admit(topic, command[1]):
             self._commands[side] = command[1]
             self.advance()
+
+    def _count_more(self, counter: str, topic: Topic, stamp_ns: int) -> None:
+        """Count an answer that is one too many, and say whose; not where the state was published again, which asks."""
+        if stamp_ns == self._asked_ns:
+            self._plant.count(counter)
+        else:
+            self._plant.refuse(counter, topic)
 
     def advance(self) -> None:
         """Do what is due once the current state has been answered: reset, finish, pause or advance."""

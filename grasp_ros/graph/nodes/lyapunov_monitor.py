@@ -49,6 +49,8 @@ class LyapunovMonitor:
             raise Refused(f"{side}/parameters: {len(cdr)} bytes; allowed: at most {MOST_BYTES}")
         message = deserialize_message(cdr, JointState)
         self.lost += self._numbers[side].take(message)
+        if len(message.name) != len(message.position):
+            raise Refused(f"{side}/parameters: {len(message.name)} names, {len(message.position)} numbers")
         stamp, numbers = to_ns(message.header.stamp), dict(zip(message.name, message.position, strict=True))
         wanted = set(self._scene.numbers_of(f"{side}_controller"))
         if set(numbers) != wanted:

@@ -159,14 +159,17 @@ class GraspNode(ParameterNode):
         """Add to a counter."""
         self.counters[counter] = int(self.counters.get(counter, 0)) + number
 
-    def refuse(self, counter: str, topic: Topic, why: str = "") -> None:
-        """Count a message that cannot be true, and say every few seconds whose it may be, and why."""
+    def refuse(self, counter: str, topic: Topic, why: str = "", names: Sequence[str] = ()) -> None:
+        """Count a message that cannot be true, and say every few seconds whose it may be, and why.
+
+        `names`: of the sources when it came, if that was before; whoever left at once may not be seen.
+        """
         self.count(counter)
         now = time.monotonic()
         if now >= self._complaints.get((counter, topic), 0.0):
             self._complaints[counter, topic] = now + PATIENCE_SECONDS
-            names = " and ".join(self.sources(topic)) or "none any more"
-            words = f"{topic.name}: {counter}: {self.counters[counter]}; sources: {names}"
+            seen = " and ".join(names or self.sources(topic)) or "none any more"
+            words = f"{topic.name}: {counter}: {self.counters[counter]}; sources seen: {seen}"
             self.get_logger().warning(f"{words}; {why}" if why else words)
 
     def flush(self, *publishers: Publisher, seconds: float = ACKNOWLEDGE_SECONDS) -> bool:

@@ -1,4 +1,4 @@
-"""The stranger of a drill, as the study speaks with it, and the domains in which drills take place."""
+"""The fault injector of a drill, as the study speaks with it, and the domains in which drills take place."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Failed(Exception):  # noqa: N818 - a drill that could not take place
 
 
 class Companion:
-    """The stranger's process, for one drill after the other.
+    """The process of the fault injector, for one drill after the other.
 
     Parameters
     ----------
@@ -36,7 +36,13 @@ class Companion:
         self.pid = self._process.pid
 
     def ask(self, action: str, **words: Any) -> dict[str, Any]:
-        """Let it do something; returns its answer."""
+        """Let it do something; returns its answer.
+
+        Raises
+        ------
+        Failed
+            If it cannot: nobody reads what it would send, or it has ended.
+        """
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.write(json.dumps({"do": action, **words}) + "\n")
@@ -44,6 +50,8 @@ class Companion:
         for line in self._process.stdout:
             if line.startswith("{"):  # Fast DDS writes there, too
                 answer: dict[str, Any] = json.loads(line)
+                if "failed" in answer:
+                    raise Failed(answer["failed"])
                 return answer
         raise Failed("the onlooker has ended")
 

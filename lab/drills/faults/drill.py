@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 import signal
@@ -44,8 +45,13 @@ class Drill(NamedTuple):
     seen: Topic = JOINT_STATES  # by which ticks are counted, see `Stage`
     asked: bool = False  # no accident, but how a user ends a run
     quick: bool = False  # `--quick` plays it
-    culprit: str = ""  # whose name the last sentence has to have; empty: nobody's
+    culprit: str = ""  # pattern of who or what was hit, or did it, in the message; empty: nobody, it is said there why
     play: Callable[[Stage], Evidence] | None = None  # in place of the common course of a drill
+
+
+def node(name: str) -> str:
+    """Pattern of a message that blames a node: others name it in full, or it speaks of itself, and of no other one."""
+    return rf"/{name}\b|\b{name}: (was|this node was) "
 
 
 class Skipped(Exception):  # noqa: N818 - no error
@@ -55,7 +61,7 @@ class Skipped(Exception):  # noqa: N818 - no error
 def play(drill: Drill, stage: Stage) -> Evidence:
     """Play a drill to its end; returns what is known then."""
     if drill.play is not None:
-        return drill.play(stage)
+        return dataclasses.replace(drill.play(stage), culprit=drill.culprit)
     drill.start(stage)
     if drill.settle:
         stage.settle()
@@ -71,9 +77,9 @@ def play(drill: Drill, stage: Stage) -> Evidence:
     hung = not over and not went_on
     asked = time.monotonic()
     left = _close(stage, wait=not (went_on or hung))
-    evidence = Evidence(went_on=went_on, hung=hung, left=len(left), mute=drill.mute, asked=drill.asked,
-                        nothing_to_keep=drill.nothing_to_keep)
-    _read_words(evidence, stage, drill.culprit, called, asked if went_on or hung else math.inf)
+    evidence = Evidence(culprit=drill.culprit, went_on=went_on, hung=hung, left=len(left), mute=drill.mute,
+                        asked=drill.asked, nothing_to_keep=drill.nothing_to_keep)
+    _read_words(evidence, stage, called, asked if went_on or hung else math.inf)
     evidence.noticed = max(evidence.noticed - (begin - called), 0.0)
     evidence.exits = {name: process.returncode for name, process in stage.started.items()
                       if name.split()[-1] in TERMINALS and process.returncode is not None}
@@ -128,18 +134,20 @@ def _close(stage: Stage, wait: bool) -> list[int]:
     return left
 
 
-def _read_words(evidence: Evidence, stage: Stage, culprit: str, begin: float, end: float) -> None:
-    """What the user sees, and when the first sentence or report came."""
+def _read_words(evidence: Evidence, stage: Stage, begin: float, end: float) -> None:
+    """What the user sees, and when the first sentence or report came.
+
+    The cause is in the last sentence of a run that ends, and in the first of one that goes on; effects follow.
+    """
     news = stage.output.news(begin, end)
     concerns = stage.companion.ask("concerns")["concerns"]
-    reports = [(when, words) for when, _, words in concerns.values() if begin <= when <= end]
+    reports = [(when, f"/diagnostics of {name.lstrip('/')}: {words}") for name, (when, _, words) in concerns.items()
+               if begin <= when <= end]
     times = [line.when for line in news] + [when for when, _ in reports]
     evidence.noticed = min(times, default=math.nan) - begin
     words = [line.text for line in news]
-    spoken = [text for text in words if SENTENCE.match(text)] or words
-    said = spoken[-1] if spoken else f"/diagnostics: {reports[-1][1]}" if reports else ""
-    evidence.said = plain(said, [stage.place])
-    evidence.blames_another = bool(culprit) and culprit not in evidence.said
+    spoken = [text for text in words if SENTENCE.match(text)] or words or [text for _, text in reports] or [""]
+    evidence.said = plain(spoken[0 if evidence.went_on else -1], [stage.place])
     evidence.traceback = plain(stage.output.traceback, [stage.place])
 
 

@@ -33,11 +33,11 @@ def drills() -> list[Drill]:
     """Cuts shorter and longer than the lease, and an uninvited guest."""
     cuts = [
         Drill(f"cut-{seconds:g}-s", GROUP, f"the cable of the controllers is cut for {seconds:g} s", start,
-              partial(cut, seconds=seconds))
-        for seconds in (SHORT, LONG)
+              partial(cut, seconds=seconds), culprit=f"{may_be_silent}/(left|right)_controller")  # both are behind it
+        for seconds, may_be_silent in ((SHORT, "^$|"), (LONG, ""))  # a short cut may be over before it is noticed
     ]
     fault = "another host that names this one as a peer (`ROS_STATIC_PEERS`), without `--network`"
-    return [*cuts, Drill("peer", GROUP, fault, start, start, play=peer)]
+    return [*cuts, Drill("peer", GROUP, fault, start, start, play=peer)]  # which says itself who was found
 
 
 def start(stage: Stage) -> None:

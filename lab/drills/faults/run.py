@@ -40,7 +40,7 @@ def chosen(names: Sequence[str], quick: bool) -> list[Drill]:
     drills = all_drills()
     known = {drill.name for drill in drills}
     if unknown := sorted(set(names) - known):
-        raise Refused(f"--only: {', '.join(unknown)}: no such drill; allowed: {', '.join(sorted(known))}")
+        raise Refused(f"--only: {', '.join(unknown)}: no such fault; allowed: {', '.join(sorted(known))}")
     if names:
         return [drill for drill in drills if drill.name in names]
     return [drill for drill in drills if drill.quick or not quick]
@@ -69,7 +69,7 @@ def run(drills: Sequence[Drill], docs: Path | None) -> bool:
             companions.put(Companion())
         futures = {pool.submit(_one, drill, Path(directory), companions, domains): drill for drill in drills}
         try:
-            for future in tqdm(as_completed(futures), total=len(futures), unit="drill"):
+            for future in tqdm(as_completed(futures), total=len(futures), unit="fault"):
                 drill = futures[future]
                 found[drill.name] = evidence = future.result()
                 if not evidence.verdict.passes:

@@ -10,7 +10,7 @@ from functools import partial
 from signal import Signals
 
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV
-from lab.drills.faults.drill import Drill
+from lab.drills.faults.drill import Drill, node
 from lab.drills.faults.stage import NODES, Stage
 
 FROZEN_SECONDS = 5.0
@@ -20,6 +20,7 @@ SIGNALS = ("SIGKILL", "SIGSTOP", "SIGHUP", "SIGQUIT", "SIGTERM", "SIGINT")
 ALONE_SIGNALS = ("SIGKILL", "SIGTERM")
 ASKING = ("SIGHUP", "SIGQUIT", "SIGTERM", "SIGINT")  # the graph to end
 UNDER, ALONE, PATIENT = "under `grasp run`", "in four terminals, with `on_silence:=end`", "in four terminals"
+PARENT, SUSPENDED = "parent process", "this node was suspended"  # in what nodes say of it, and of themselves
 QUICK = ("SIGKILL-monitor", "SIGKILL-grasp")
 
 
@@ -33,7 +34,7 @@ def drills() -> list[Drill]:
     found += [_one(PATIENT, Stage.terminals, "SIGSTOP", name) for name in NODES]
     back = [
         Drill(f"SIGKILL-{name}-back", PATIENT, f"SIGKILL of the {name.replace('_', ' ')}, and another one is started",
-              Stage.terminals, partial(replace, name=name))
+              Stage.terminals, partial(replace, name=name), culprit=node(name))
         for name in ("left_controller", "right_controller")
     ]
     return [*found, *back, *_at_other_moments()]
@@ -48,7 +49,8 @@ def _one(group: str, start: Callable[[Stage], None], number: str, name: str) -> 
     strike = partial(freeze, name=name) if number == "SIGSTOP" else kill
     asked = name == "grasp run" and number in ASKING
     seen = LYAPUNOV if name == "monitor" else JOINT_STATES
-    culprit = "" if name == "grasp run" or group == PATIENT else name
+    # A user who asks `grasp run` to end is no culprit, and nobody waits for it while it is frozen.
+    culprit = node(name) if name != "grasp run" else PARENT if number == "SIGKILL" else ""
     return Drill(key, group, words, start, strike, seen=seen, asked=asked, quick=key in QUICK, culprit=culprit)
 
 
@@ -93,27 +95,32 @@ def _at_other_moments() -> list[Drill]:
     group, one_process = "at other moments", _run_with("--one-process")
     return [
         Drill("freeze-a-moment", group, f"SIGSTOP of each node in turn, SIGCONT after {MOMENT_SECONDS:g} s", Stage.run,
-              freeze_all),
+              freeze_all, culprit=SUSPENDED),
         Drill("suspend", group, f"SIGSTOP of all processes at once, SIGCONT after {FROZEN_SECONDS:g} s", Stage.run,
-              suspend),
+              suspend, culprit=SUSPENDED),
         Drill("kill-while-paused", group, "SIGKILL of the left controller of a paused graph",
-              _run_with("--paused"), _while_paused, settle=False),
+              _run_with("--paused"), _while_paused, settle=False, culprit=node("left_controller")),
         Drill("kill-while-starting", group, "SIGKILL of the left controller while it starts", Stage.run,
-              partial(_while_starting, name="left_controller"), settle=False, nothing_to_keep=True),
+              partial(_while_starting, name="left_controller"), settle=False, nothing_to_keep=True,
+              culprit=node("left_controller")),
         Drill("kill-monitor-while-starting", group, "SIGKILL of the monitor while it starts", Stage.run,
-              partial(_while_starting, name="monitor"), settle=False, nothing_to_keep=True),
+              partial(_while_starting, name="monitor"), settle=False, nothing_to_keep=True,
+              culprit=node("monitor")),
         Drill("kill-run-while-starting", group, "SIGKILL of `grasp run` while its nodes start", Stage.run,
-              partial(_while_starting, name="grasp run", with_node="monitor"), settle=False, nothing_to_keep=True),
+              partial(_while_starting, name="grasp run", with_node="monitor"), settle=False, nothing_to_keep=True,
+              culprit=PARENT),
         Drill("kill-free-controller", group, "SIGKILL of the left controller of a free-running graph",
-              _run_with("--free-running"), partial(Stage.signal, name="left_controller", number=signal.SIGKILL)),
+              _run_with("--free-running"), partial(Stage.signal, name="left_controller", number=signal.SIGKILL),
+              culprit=node("left_controller")),
         Drill("kill-one-process", group, "SIGKILL of the one process of `--one-process`", one_process,
-              partial(Stage.signal, name="graph", number=signal.SIGKILL), seen=LYAPUNOV),
+              partial(Stage.signal, name="graph", number=signal.SIGKILL), seen=LYAPUNOV, culprit=node("graph")),
         Drill("freeze-one-process", group, f"SIGSTOP of the one process of `--one-process`, SIGCONT after"
-              f" {FROZEN_SECONDS:g} s", one_process, partial(freeze, name="graph"), seen=LYAPUNOV),
+              f" {FROZEN_SECONDS:g} s", one_process, partial(freeze, name="graph"), seen=LYAPUNOV,
+              culprit=node("graph")),
         Drill("kill-run-of-one-process", group, "SIGKILL of `grasp run --one-process`", one_process,
-              partial(Stage.signal, name="grasp run", number=signal.SIGKILL)),
+              partial(Stage.signal, name="grasp run", number=signal.SIGKILL), culprit=PARENT),
         Drill("ctrl-c-twice", group, "Ctrl-C, and another one while it ends", Stage.run, _twice,
-              asked=True),
+              asked=True),  # by the user: nobody is to blame
     ]
 
 

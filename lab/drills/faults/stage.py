@@ -1,4 +1,4 @@
-"""Where a drill takes place: processes in a domain of their own, a stranger that looks on, and what they leave."""
+"""Where a drill takes place: processes in their own domain, a fault injector that looks on, and what they leave."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Stage:
         )
 
     def look_on_from(self, prefix: Sequence[str]) -> None:
-        """Let a stranger on another host look on."""
+        """Let a fault injector on another host look on."""
         self.companion.ask("close")
         self.companion = Companion(prefix)
         self._open()
@@ -210,7 +210,7 @@ class Stage:
         self.companion.ask("clear")
 
     def shared_memory(self) -> set[str]:
-        """Files in /dev/shm that processes of this drill have opened, and the stranger has not."""
+        """Files in /dev/shm that processes of this drill have opened, and the fault injector has not."""
         own = {name for process in self._processes() for name in _shared(process)}
         return own - _shared(psutil.Process(self.companion.pid))
 

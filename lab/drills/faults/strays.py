@@ -9,12 +9,25 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from grasp_ros.scene.topics import FORCE, JOINT_STATES, LEFT_COMMAND, LYAPUNOV, NAMED_LIST, RUN, SCENE, Topic
+from grasp_ros.scene.topics import (
+    ALIVE,
+    CHANGES,
+    JOINT_STATES,
+    LEFT_COMMAND,
+    LEFT_CONTACT,
+    LYAPUNOV,
+    RUN,
+    SCENE,
+    Topic,
+)
 from lab.drills.faults.drill import Drill
 from lab.drills.faults.stage import NODE, Stage
+from lab.drills.nodes import NAME
 
 STRAY, ROGUE, OTHERS = "a stray message", "a controller that answers wrongly", "others in the same domain"
 CODE = "!!python/object/apply:os.mkdir ['owned']"
+NAMES_SECONDS = 2.0  # for discovery to tell the names of nodes that have just come
+INJECTOR = f"/{NAME}"
 MALFORMED: dict[str, Any] = {"name": ["left", "object"], "position": [0.1], "velocity": [], "effort": [1.0, 2.0, 3.0]}
 
 
@@ -28,9 +41,9 @@ def _strays() -> list[Drill]:
     def stray(name: str, fault: str, topic: Topic, fields: dict[str, Any], seconds: float = 0.0, quick: bool = False
               ) -> Drill:
         send = partial(_stray, topic=topic, fields=fields, seconds=seconds)
-        return Drill(name, STRAY, fault, Stage.run, send, quick=quick)
+        return Drill(name, STRAY, fault, Stage.run, send, quick=quick, culprit=INJECTOR)
 
-    push, parameters = {"wrench.force.x": 1.0}, Topic("left/parameters", NAMED_LIST, latched=True)
+    push = {"wrench.force.x": 1.0}
     return [
         stray("wall-clock", "one command stamped with the wall clock", LEFT_COMMAND, {"stamp": "wall", **push},
               quick=True),
@@ -39,19 +52,20 @@ def _strays() -> list[Drill]:
         stray("frame-world", "one command whose frame_id is world", LEFT_COMMAND, {"header.frame_id": "world", **push}),
         stray("flood", "commands at full speed for 2 s", LEFT_COMMAND, push, seconds=2.0),
         stray("malformed-state", "one malformed joint_states", JOINT_STATES, MALFORMED),
-        stray("malformed-lyapunov", "one malformed lyapunov", LYAPUNOV, MALFORMED),
-        stray("malformed-parameters", "one malformed left/parameters", parameters, MALFORMED),
+        stray("malformed-lyapunov", "one malformed lyapunov stamped with the wall clock", LYAPUNOV,
+              {"stamp": "wall", **MALFORMED}),  # the plant reads the stamp alone
+        stray("malformed-parameters", "one malformed left/parameters", CHANGES["left"], MALFORMED),
         stray("stray-scene", "a scene with a tag of Python", SCENE, {"data": CODE}),
         stray("stray-run", "a text of another kind on run", RUN, {"data": CODE}),
         Drill("stray-scene-alone", STRAY, "a scene with a tag of Python, before the plant is there", _without_plant,
-              _scene_before, settle=False, nothing_to_keep=True),
+              _scene_before, settle=False, nothing_to_keep=True, culprit=INJECTOR),
         stray("stray-contact", "contact forces stamped with the wall clock, at full speed for 2 s",
-              Topic("contact/left", FORCE), {"stamp": "wall"}, seconds=2.0),
+              LEFT_CONTACT, {"stamp": "wall"}, seconds=2.0),
     ]
 
 
 def _stray(stage: Stage, topic: Topic, fields: dict[str, Any], seconds: float = 0.0) -> None:
-    answer = stage.companion.ask("publish", topic=topic.name, type=topic.type, fields=fields, seconds=seconds)
+    answer = stage.companion.ask("publish", topic=topic, fields=fields, seconds=seconds)
     stage.happens(answer["begin"])
 
 
@@ -61,6 +75,8 @@ def _without_plant(stage: Stage) -> None:
 
 
 def _scene_before(stage: Stage) -> None:
+    stage.companion.ask("wait_for_sources", topic=ALIVE.name, number=len(stage.started))
+    time.sleep(NAMES_SECONDS)
     _stray(stage, SCENE, {"data": CODE})
     stage.node("plant")
     stage.wait(lambda: stage.published > 0, 30.0)
@@ -68,16 +84,16 @@ def _scene_before(stage: Stage) -> None:
 
 def _rogues() -> list[Drill]:
     """The only controller of an arm, which answers well until then."""
-    def rogue(name: str, fault: str, **fields: Any) -> Drill:
-        return Drill(f"rogue-{name}", ROGUE, fault, _with_rogue, partial(_go_wrong, **fields))
+    def rogue(name: str, fault: str, culprit: str = INJECTOR, **fields: Any) -> Drill:
+        return Drill(f"rogue-{name}", ROGUE, fault, _with_rogue, partial(_go_wrong, **fields), culprit=culprit)
 
     return [
-        rogue("large", "answers with 1e6 N", force=1e6),
+        rogue("large", "answers with 1e6 N", "", force=1e6),  # which a scene without a limit allows
         rogue("nan", "answers with NaN", **{"wrench.force.x": "nan"}),
         rogue("repeated", "answers each state twenty times", times=20),
         rogue("wall-clock", "stamps its answers with the wall clock", stamp="wall"),
         rogue("old", "stamps its answers with tick 5", stamp=5_000_000),
-        rogue("frame", "gives its answers a frame_id of 12, then of world", **{"header.frame_id": "12"}),
+        rogue("frame", "gives its answers a frame_id of 12", "", **{"header.frame_id": "12"}),  # nobody reads it
         rogue("silent", "answers no more, but stays", times=0),
     ]
 
@@ -95,13 +111,14 @@ def _others() -> list[Drill]:
     other = ("-p", "left_feedback.position_gain_N_per_m:=9.0", "-r", "__node:=other")
     return [
         Drill("second-controller", OTHERS, "a second left controller, with another gain", Stage.run,
-              partial(_second, name="left_controller", topic=LEFT_COMMAND, words=other)),
+              partial(_second, name="left_controller", topic=LEFT_COMMAND, words=other), culprit="/other"),
         Drill("second-plant", OTHERS, "a second plant", Stage.run, partial(_second, name="plant", topic=JOINT_STATES),
               by_itself=True),
-        Drill("second-run", OTHERS, "a second `grasp run`", Stage.run, _second_run, by_itself=True),
-        Drill("frozen-reader", OTHERS, "a subscriber that is frozen", _with_reader, _freeze_reader),
+        Drill("second-run", OTHERS, "a second `grasp run`", Stage.run, _second_run, by_itself=True,
+              culprit="already runs"),
+        Drill("frozen-reader", OTHERS, "a subscriber that is frozen", _with_reader, _freeze_reader),  # nobody needs it
         Drill("other-scene", OTHERS, "the plant is killed, and one with another scene is started", Stage.terminals,
-              _other_scene),
+              _other_scene, culprit="/plant"),
     ]
 
 

@@ -15,6 +15,7 @@ import psutil
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
+from grasp_ros.scene.topics import LEFT_COMMAND
 from grasp_ros.simulation import simulate
 from lab.drills import recorder
 from lab.drills.faults.drill import Drill, Skipped, play
@@ -23,6 +24,7 @@ from lab.drills.faults.verdict import Evidence
 
 CHECKOUT = Path(__file__).parents[3]  # where `python -m lab` runs
 GROUP, NAMES, FILES = "terminal, disk and directory", "names and waiting", "files"
+DELETED = "was deleted"
 DISK_BYTES, LIMIT_BLOCKS = 3_500_000, 6_600  # of a file system, and of `ulimit -f`, in units of 512 bytes
 IDLE_SECONDS, IDLE_SHARE = 3.0, 0.05  # of a core, while there is nothing to do
 CUTS, FILE_COUNT = 40, 200
@@ -31,18 +33,22 @@ CUTS, FILE_COUNT = 40, 200
 def drills() -> list[Drill]:
     """All of them."""
     return [
+        # Nobody can read what is said.
         Drill("closed-terminal", GROUP, "its terminal is closed", _in_terminal, _close_output, mute=True),
         Drill("closed-pipe", GROUP, "nobody reads its output any more", _in_pipe, _close_output, mute=True),
-        Drill("full-disk", GROUP, "the disk becomes full", _on_small_disk, _until_the_end, by_itself=True),
+        Drill("full-disk", GROUP, "the disk becomes full", _on_small_disk, _until_the_end, by_itself=True,
+              culprit="no space is left on the disk"),
         Drill("file-limit", GROUP, "a limit of the file size (`ulimit -f`)", _with_limit, _until_the_end,
-              by_itself=True),
+              by_itself=True, culprit="files may not be larger"),
         Drill("deleted-bag", GROUP, "the directory of the bag is deleted", Stage.run, _delete_bag,
-              nothing_to_keep=True),
+              nothing_to_keep=True, culprit=DELETED),
         Drill("deleted-run", GROUP, "the whole directory of the run is deleted", Stage.run, _delete_run,
-              nothing_to_keep=True),
+              nothing_to_keep=True, culprit=DELETED),
+        # From here on what counts is measured, not said, or nothing happens.
         _own("shared-memory", GROUP, "files in /dev/shm after a SIGKILL of all four nodes", _shared_memory),
         _own("idle", NAMES, "a plant that waits, alone: at most 5 % of a core", _idle),
-        _own("remapped-input", NAMES, "a plant whose command topic has another name than its controller's", _remapped),
+        _own("remapped-input", NAMES, "a plant whose command topic has another name than its controller's", _remapped,
+             culprit=LEFT_COMMAND.name),
         Drill("remapped", NAMES, "all topics and /clock remapped, in all nodes alike", _all_remapped, _nothing),
         _own("power-cut", FILES, f"a power cut: the bag cut off at {CUTS} places", _power_cut),
         _own("damaged-files", FILES,
@@ -50,8 +56,8 @@ def drills() -> list[Drill]:
     ]
 
 
-def _own(name: str, group: str, fault: str, play: Callable[[Stage], Evidence]) -> Drill:
-    return Drill(name, group, fault, _nothing, _nothing, play=play)
+def _own(name: str, group: str, fault: str, play: Callable[[Stage], Evidence], culprit: str = "") -> Drill:
+    return Drill(name, group, fault, _nothing, _nothing, play=play, culprit=culprit)
 
 
 def _nothing(_: Stage) -> None:

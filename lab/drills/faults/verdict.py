@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -36,7 +37,8 @@ class Verdict(Enum):
 class Evidence:
     """What is known of a drill once it is over."""
 
-    said: str = ""  # the last sentence that a user sees; empty: none
+    said: str = ""  # what a user sees: the last sentence of a run that ended, the first of one that goes on; or none
+    culprit: str = ""  # pattern of what that has to name, see `Drill`
     noticed: float = math.nan  # s, from the accident to the first sentence or report; NaN: never
     exits: dict[str, int] = field(default_factory=dict)  # exit statuses by process
     lost: float = 0.0  # s of wall time before the accident from which nothing is in the bag
@@ -44,7 +46,6 @@ class Evidence:
     hung: bool = False
     left: int = 0  # processes that are still there
     shared: int = 0  # files in /dev/shm that are still there
-    blames_another: bool = False  # the last sentence does not name the process that was hit
     traceback: str = ""  # its last line
     wrong: str = ""  # why what the bag holds is not the run
     mute: bool = False  # nobody could read a sentence: the terminal is gone
@@ -55,13 +56,14 @@ class Evidence:
     @property
     def verdict(self) -> Verdict:
         """The first that holds."""
-        silent = not self.said and not self.mute
+        nothing_to_say = self.mute or (self.went_on and re.match(self.culprit, "") is not None)
+        silent = not self.said and not nothing_to_say
         found = {
             Verdict.SKIPPED: bool(self.skipped), Verdict.TRACEBACK: bool(self.traceback),
             Verdict.LEFT: self.left > 0, Verdict.HUNG: self.hung,
             Verdict.LOST: not self.nothing_to_keep and self.lost > LOST_SECONDS,
-            Verdict.WRONG: bool(self.wrong), Verdict.SURVIVED: self.went_on, Verdict.SILENT: silent,
-            Verdict.NAME: self.blames_another,
+            Verdict.WRONG: bool(self.wrong), Verdict.SILENT: silent,
+            Verdict.NAME: not self.mute and not re.search(self.culprit, self.said), Verdict.SURVIVED: self.went_on,
             Verdict.LATE: not (self.mute or self.asked) and not self.noticed <= NOTICE_SECONDS + SLACK_SECONDS,
         }
         return next((verdict for verdict, holds in found.items() if holds), Verdict.SENTENCE)

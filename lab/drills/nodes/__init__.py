@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+NAME = "fault_injector"
+
 
 def command(name: str) -> list[str]:
     """What starts a node of this room, from any directory."""

@@ -37,7 +37,7 @@ INPUTS = (JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, LEFT_CONTACT, RIGHT_CONTACT
 COMMANDS = {"left_controller": LEFT_COMMAND, "right_controller": RIGHT_COMMAND}
 
 
-class Bare(Node):
+class Baseline(Node):
     """One of the four nodes, by its name."""
 
     def __init__(self, name: str, ticks: int) -> None:
@@ -94,7 +94,7 @@ class Bare(Node):
 def main(name: str, ticks: int) -> None:
     """Run one node until it is stopped; the plant prints its ticks per second and ends."""
     rclpy.init()
-    node = Bare(name, ticks)
+    node = Baseline(name, ticks)
     executor = EventsExecutor()
     executor.add_node(node)
     settled = time.monotonic() + SETTLE_SECONDS

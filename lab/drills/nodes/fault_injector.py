@@ -25,15 +25,16 @@ from sensor_msgs.msg import JointState
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.serialization import raw_stamp_ns
 from grasp_ros.scene.topics import COMMANDS, DEPTH, DIAGNOSTICS, JOINT_STATES, Topic
-from lab.drills.nodes import plain_messages
+from lab.drills.nodes import NAME, plain_messages
 
 SPIN_SECONDS = 0.01
 MATCH_SECONDS = 40.0  # for the readers of what it sends to be found
+KEEP_SECONDS = 0.1  # that it stays a source after its last message, as `ros2 topic pub --once` does
 POSITION_GAIN, VELOCITY_GAIN = 5.0, 0.5  # as long as it answers well
 WALL = "wall"  # in place of a stamp in ns: the wall clock, as a header that fills itself has it
 
 
-class Stranger:
+class FaultInjector:
     """What happens in one domain.
 
     Parameters
@@ -49,7 +50,7 @@ class Stranger:
     def __init__(self, domain: int, times: str, period_ns: int, topic: str) -> None:
         self._context = rclpy.Context()
         rclpy.init(args=[], context=self._context, domain_id=domain)
-        self._node = rclpy.create_node("stranger", context=self._context, enable_rosout=False)
+        self._node = rclpy.create_node(NAME, context=self._context, enable_rosout=False)
         self._executor = EventsExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._times = np.load(Path(times), mmap_mode="r+")
@@ -97,26 +98,40 @@ class Stranger:
         self._wait(lambda: self._node.count_publishers(topic) >= number, seconds)
         return {"when": time.monotonic(), "there": self._node.count_publishers(topic)}
 
-    def publish(self, topic: str, type: str, fields: dict[str, Any], seconds: float = 0.0) -> dict[str, Any]:
+    def publish(self, topic: list[Any], fields: dict[str, Any], seconds: float = 0.0) -> dict[str, Any]:
         """Send a message once its readers are there, once or at full speed for some seconds; then stop to be a source.
 
-        Fields are named by their paths; `stamp` is in ns, or WALL.
+        The topic comes as a list of what `Topic` has. Fields are named by their paths; `stamp` is in ns, or WALL.
         """
-        publisher = self._node.create_publisher(messages.TYPES[type], topic, messages.qos(Topic(topic, type)))
-        self._wait(lambda: publisher.get_subscription_count() > 0)
-        message = filled(messages.TYPES[type](), {"stamp": self._latest_ns, **fields})
+        own = Topic(*topic)
+        publisher = self._publisher(own)
+
+        def read() -> bool:
+            """By all who are known, of whom it may be one itself."""
+            readers = [reader.node_name for reader in self._node.get_subscriptions_info_by_topic(own.name)]
+            return bool({*readers} - {NAME}) and publisher.get_subscription_count() >= len(readers)
+
+        if not self._wait(read):
+            return {"failed": f"{own.name} is not read by all who should"}
+        message = filled(messages.TYPES[own.type](), {"stamp": self._latest_ns, **fields})
         begin, sent = time.monotonic(), 0
         while not sent or time.monotonic() < begin + seconds:
             publisher.publish(message)
             sent += 1
             self.spin() if sent % 100 == 0 else None
+        self._wait(lambda: False, KEEP_SECONDS)
         self._node.destroy_publisher(publisher)
         return {"begin": begin, "sent": sent}
 
-    def _wait(self, condition: Callable[[], bool], seconds: float = MATCH_SECONDS) -> None:
+    def _publisher(self, topic: Topic) -> Any:
+        return self._node.create_publisher(messages.TYPES[topic.type], topic.name, messages.qos(topic))
+
+    def _wait(self, condition: Callable[[], bool], seconds: float = MATCH_SECONDS) -> bool:
+        """Take what comes until a condition holds; whether it does."""
         deadline = time.monotonic() + seconds
-        while not condition() and time.monotonic() < deadline:
+        while not (holds := condition()) and time.monotonic() < deadline:
             self.spin()
+        return holds
 
     def control(self, side: str, force: float | None = None, **fields: Any) -> dict[str, Any]:
         """Answer all states on behalf of an arm from now on: with a spring and a damper, or with this force.
@@ -125,10 +140,10 @@ class Stranger:
         """
         self._answer = {"side": side, "force": force, "times": 1, **fields}
         if self._commands is None:  # listen first: a plant begins as soon as there is a source that does
-            topic = COMMANDS[side]
             self._node.create_subscription(JointState, JOINT_STATES.name, self._control, messages.qos(JOINT_STATES))
-            self._commands = self._node.create_publisher(messages.TYPES[topic.type], topic.name, messages.qos(topic))
-            self._wait(lambda: self._commands.get_subscription_count() > 1)  # plant and monitor
+            self._commands = self._publisher(COMMANDS[side])
+            if not self._wait(lambda: self._commands.get_subscription_count() > 1):
+                return {"failed": f"plant and monitor do not read {COMMANDS[side].name}"}
         return {}
 
     def _control(self, state: JointState) -> None:
@@ -159,25 +174,25 @@ def filled(message: Any, fields: dict[str, Any]) -> Any:
 
 def main() -> None:
     """Do what the lines say until there are no more."""
-    stranger: Stranger | None = None
+    injector: FaultInjector | None = None
     while True:
-        if stranger is not None and not select.select([sys.stdin], [], [], 0.0)[0]:
-            stranger.spin()
+        if injector is not None and not select.select([sys.stdin], [], [], 0.0)[0]:
+            injector.spin()
             continue
         if not (line := sys.stdin.readline()):  # nobody asks again before the answer, so that none waits in its buffer
             break
         words = json.loads(line)
         action, answer = words.pop("do"), {}
         if action == "open":
-            stranger = Stranger(**words)
-        elif stranger is not None and action == "close":
-            stranger.close()
-            stranger = None
+            injector = FaultInjector(**words)
+        elif injector is not None and action == "close":
+            injector.close()
+            injector = None
         else:
-            answer = getattr(stranger, action)(**words)
+            answer = getattr(injector, action)(**words)
         print(json.dumps(answer), flush=True)
-    if stranger is not None:
-        stranger.close()
+    if injector is not None:
+        injector.close()
 
 
 if __name__ == "__main__":
