@@ -1,6 +1,7 @@
 """Regression scenes: each failed a check once; what is right by the reference, and how far the product is from it.
 
-`lab/cases/regression` holds the scenes and the answers to those whose motion can be compared.
+`lab/cases/regression` holds the scenes and the answers to those whose motion can be compared, `lab/cases/outside` those
+that the domain excludes.
 `python -m lab.cases.regression NAME ...` writes the answers to some of them.
 """
 
@@ -8,6 +9,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -19,7 +21,7 @@ from gmpy2 import mpfr
 from grasp_ros import scene as scenes
 from grasp_ros.cli.parser import Parser
 from grasp_ros.exact.integrator import Status
-from grasp_ros.physics.domain import LARGEST_POSITION
+from grasp_ros.physics.domain import LARGEST_POSITION, RULES
 from grasp_ros.physics.layout import EPS
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
@@ -29,6 +31,7 @@ from lab.oracles.rounding_bounds import largest, rates
 from lab.reference import integrate
 
 SCENES = Path(__file__).with_name("regression")
+OUTSIDE = SCENES.with_name("outside")
 ANSWERS = SCENES / "answers.json"
 DIGITS = 25
 STEPS = 2_500  # of the reference; where it needs more the answer ends earlier
@@ -65,6 +68,19 @@ def names() -> list[str]:
 def load(name: str) -> Scene:
     """A scene by its name."""
     return scenes.load(str(SCENES / f"{name}.yaml"))
+
+
+def refusals() -> Counter[tuple[str, str]]:
+    """How many scenes of OUTSIDE each rule of the domain refuses, by its ratio or its key, and what is allowed."""
+    found: Counter[tuple[str, str]] = Counter()
+    for path in sorted(OUTSIDE.glob("*.yaml")):
+        try:
+            scenes.load(str(path))
+        except SceneError as refusal:
+            _, key, sentence = str(refusal).split(": ", 2)
+            rule = next((rule.text for rule in RULES if rule.text in sentence), f"`{key.partition('.')[2]}`")
+            found[rule, sentence.partition("; allowed: ")[2]] += 1
+    return found
 
 
 def answers() -> dict[str, Answer]:
