@@ -27,7 +27,14 @@ from grasp_ros.physics.impact_law import EXPONENT
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, Slide, U, V, X
 from grasp_ros.sensitivity.contact import exact_length, expand_tangents, step_tangents, touches
 from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent, write_flows
-from grasp_ros.sensitivity.tangents import UNSEEN, Count, Number, Tangents, copy_matrix, tangents_at
+from grasp_ros.sensitivity.tangents import UNSEEN, Corner, Count, Number, Tangents, copy_matrix, tangents_at
+
+
+@kernel
+def note_corner(t: Tangents, time: float, why: int) -> None:
+    """Keep the first time in s at which one-sided derivatives differ, and why."""
+    if time < t.numbers[Number.CORNER]:
+        t.numbers[Number.CORNER], t.counts[Count.CORNER] = time, why
 
 
 @kernel
@@ -98,12 +105,12 @@ def pass_friction(t: Tangents, at_tick: bool) -> None:
     Where the object turns, that is its acceleration after the turn by that before it. It is nan where the one-sided
     derivatives differ. Where an object stops just when inputs change, it is undecided which of them would act on it.
     """
-    before, now, factor = t.counts[Count.SLIDE], t.mode[OBJECT], 1.0
+    before, now, factor, why = t.counts[Count.SLIDE], t.mode[OBJECT], 1.0, Corner.TURN
     if now == Slide.FREE or now == before:
         return
     slid = before == Slide.RIGHTWARD or before == Slide.LEFTWARD
     if slid and at_tick:
-        factor = math.nan
+        factor, why = math.nan, Corner.STOP
     elif now == Slide.STUCK:
         factor = 0.0
     elif slid:
@@ -112,9 +119,9 @@ def pass_friction(t: Tangents, at_tick: bool) -> None:
         first = push + t.numbers[Number.FORCE]  # under the constant force before
         factor = (push + new[Of.FORCE]) / first if first != 0.0 else math.nan
     elif before == UNSEEN and t.before[V.O] == 0.0 and t.x[V.O].any():
-        factor = math.nan
+        factor, why = math.nan, Corner.START
     if math.isnan(factor):
-        t.numbers[Number.CORNER] = min(t.numbers[Number.CORNER], t.numbers[Number.TIME])
+        note_corner(t, t.numbers[Number.TIME], why)
         return
     for j in range(t.x.shape[1]):
         t.x[V.O, j] *= factor
@@ -135,7 +142,7 @@ def check_glide(t: Tangents) -> None:
         for j in range(t.x.shape[1]):
             faster = sign * (t.x[arm, j] - t.x[V.O, j])
             if t.law[side, Law.DISSIPATION, j] * d + loss * faster != 0.0:
-                t.numbers[Number.CORNER] = 0.0
+                note_corner(t, 0.0, Corner.GLIDE)
 
 
 @kernel
@@ -274,7 +281,7 @@ def propagate(address: int, kind: int, span: float, s: float, unit: float, degre
     while counts[Count.TICK] < last:  # the ticks up to the begin of the interval
         counts[Count.TICK] += 1
         if enter_tick(t, counts[Count.TICK]):
-            t.numbers[Number.CORNER] = min(t.numbers[Number.CORNER], counts[Count.TICK] * period)
+            note_corner(t, counts[Count.TICK] * period, Corner.LIMIT)
     t.numbers[Number.TIME] = now + interval + (span if kind == REST else 0.0)
     pass_segment(t, kind, since_tick + interval, span, s, unit, degree)
     t.counts[Count.SLIDE], t.numbers[Number.FORCE] = t.mode[OBJECT], t.bodies[OBJECT, Of.FORCE]
