@@ -101,7 +101,7 @@ def answer(scene: Scene) -> Answer:
     times = sorted(halves | {scene.duration * k / PARTS for k in range(1, PARTS)})
     right = integrate(scene, times, DIGITS, budget=STEPS)
     small = [row for row in right.state if max(map(abs, row)) < LARGE]
-    drawn = [integrate(moved, times[: len(small)], DRAWN_DIGITS, budget=STEPS).state for moved in _moved(scene)]
+    drawn = [integrate(moved, times[: len(small)], DRAWN_DIGITS, budget=STEPS).state for moved in nearby(scene, DRAWS)]
     amplification = []
     for row, *changed in zip(small, *drawn, strict=False):
         changes = np.array([[float(a - b) for a, b in zip(draw, row, strict=True)] for draw in changed])
@@ -138,13 +138,13 @@ def _relative(changes: Array, size: Array) -> Array:
         return np.where(changes == 0.0, 0.0, np.abs(changes) / size)
 
 
-def _moved(scene: Scene) -> list[Scene]:
-    """The scene with some of its numbers smaller by one rounding, DRAWS times, where scenes may be so."""
+def nearby(scene: Scene, draws: int) -> list[Scene]:
+    """The scene with some of its numbers smaller by one rounding, drawn so often, where scenes may be so."""
     found: list[Scene] = []
     for seed in range(TRIES):
         with suppress(SceneError):  # k + Kp = 0 must not become negative
             found.append(scene.changed(_changes(scene, np.random.default_rng(seed))))
-        if len(found) == DRAWS:
+        if len(found) == draws:
             break
     return found
 
