@@ -16,25 +16,28 @@ from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import door, kernel
 from grasp_ros.exact.driver.callback import FINISH, REST
 from grasp_ros.exact.driver.intervals import feedback, measured
-from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
+from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, surface_factor
 from grasp_ros.exact.numerics.polynomial import invert_time
 from grasp_ros.exact.numerics.roots import shift, value_and_rate
 from grasp_ros.exact.records import Order, Step
 from grasp_ros.exact.tolerances import SURFACE
 from grasp_ros.physics.control import Column
-from grasp_ros.physics.impact_law import EXPONENT
-from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, Slide, U, V, X
-from grasp_ros.sensitivity.contact import exact_length, expand_tangents, step_tangents, touches
-from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent, write_flows
-from grasp_ros.sensitivity.tangents import UNSEEN, Corner, Count, Number, Tangents, copy_matrix, tangents_at
+from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, Slide, U, V, X
+from grasp_ros.sensitivity.contact import add_neglected, exact_length, expand_tangents, step_tangents, touches
+from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent, write_flow_at_rest, write_flows
+from grasp_ros.sensitivity.tangents import (
+    UNSEEN,
+    Corner,
+    Count,
+    Number,
+    Tangents,
+    copy_matrix,
+    note_corner,
+    tangents_at,
+)
 
-
-@kernel
-def note_corner(t: Tangents, time: float, why: int) -> None:
-    """Keep the first time in s at which one-sided derivatives differ, and why."""
-    if time < t.numbers[Number.CORNER]:
-        t.numbers[Number.CORNER], t.counts[Count.CORNER] = time, why
+SAME = 16.0 * EPS  # of the time: steps that differ by less are equal, and the sum of the differences stays below
 
 
 @kernel
@@ -175,28 +178,6 @@ def since(t: Tangents, begin: float, span: float) -> float:
 
 
 @kernel
-def add_neglected(t: Tangents, side: Body, span: float) -> None:
-    """Add the slope of the force of a pair that begins or leaves: its impulse is below rounding, its slope is not.
-
-    It begins from u = 0, or leaves to it, by a power of the time.
-    """
-    u, after, arm = t.before[U.L + side], t.y[U.L + side], velocity_lane(side)
-    deepest = max(u, after)
-    if deepest <= 0.0:
-        return
-    rate = approach(t.y if after > u else t.before, side)
-    factor = max(damping_factor(t.pairs[side, Law.DISSIPATION], rate), 0.0)
-    slope = elastic_slope(t.pairs[side, Law.HERTZIAN], deepest)
-    mean = slope / (1.0 + (EXPONENT - 1.0) * abs(rate) * span / deepest)  # for u = a t^n
-    impulse = span * factor * mean
-    arm_mass, mass = t.bodies[side, Of.MASS], t.bodies[OBJECT, Of.MASS]
-    for j in range(t.x.shape[1]):
-        apart = t.x[arm - 1, j] - t.x[X.O, j]
-        t.x[arm, j] -= impulse * apart / arm_mass
-        t.x[V.O, j] += impulse * apart / mass
-
-
-@kernel
 def fly_free(t: Tangents, presses: bool, tau: float) -> None:
     """Write the tangents of the bodies that touch nothing after tau s of a segment to `at`."""
     if presses and touches(t, LEFT) and touches(t, RIGHT):
@@ -235,15 +216,29 @@ def pass_step(t: Tangents, begin: float, span: float, s: float, unit: float, n: 
 
 
 @kernel
+def rest(t: Tangents, begin: float, span: float) -> None:
+    """Move the tangents over a time at rest, from output to output: equal steps have one flow."""
+    passed, step, end = 0.0, math.nan, t.numbers[Number.TIME]
+    while next_output(t) <= end:
+        left = since(t, begin, span) - passed
+        if not abs(left - step) <= SAME * end:
+            step = left
+            write_flow_at_rest(t, step)
+        rest_tangent(t)
+        copy_matrix(t.x, t.at)
+        write_output(t)
+        passed += step
+    write_flow_at_rest(t, span - passed)
+    rest_tangent(t)
+
+
+@kernel
 def pass_segment(t: Tangents, kind: int, begin: float, span: float, s: float, unit: float, n: int) -> None:
     """Move the tangents over a segment, or over a time at rest, and write the outputs on the way."""
     end = t.numbers[Number.TIME]
     act(t)
     if kind == REST:
-        while next_output(t) <= end:
-            rest_tangent(t, since(t, begin, span))
-            write_output(t)
-        rest_tangent(t, span)
+        rest(t, begin, span)
     elif kind == Kind.FLIGHT:
         while next_output(t) < end:
             fly_free(t, False, since(t, begin, span))

@@ -171,6 +171,13 @@ tangents_at = reader(typeof(tangents_of(*new_run()[2:], no_directions(1), np.zer
 
 
 @kernel
+def note_corner(t: Tangents, time: float, why: int) -> None:
+    """Keep the first time in s at which one-sided derivatives differ, and why."""
+    if time < t.numbers[Number.CORNER]:
+        t.numbers[Number.CORNER], t.counts[Count.CORNER] = time, why
+
+
+@kernel
 def copy_matrix(target: Array, source: Array) -> None:
     """Copy what two matrices have in common, without the scratch that an assignment of arrays may need."""
     for i in range(min(target.shape[0], source.shape[0])):

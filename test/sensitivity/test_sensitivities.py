@@ -142,6 +142,20 @@ def test_an_object_that_stops_just_when_inputs_change_is_flagged() -> None:
     assert derivatives(later, "object.velocity_m_per_s").corner is None
 
 
+@pytest.mark.parametrize("grid", [np.linspace(0.0, 10.0, 501), np.geomspace(1e-3, 10.0, 50)])
+def test_outputs_at_rest_have_the_derivatives_that_they_have_alone(grid: np.ndarray) -> None:
+    """Equal steps from output to output have one flow."""
+    keys = ["left_arm.mass_kg", "left_arm.stiffness_N_per_m", "left_feedback.set_point_m"]
+    scene = scenes.load("preload")
+    several = simulate(scene, grid=grid, sensitivity=keys).sensitivity
+    assert several is not None
+    largest = np.abs(several.state_rates).max(axis=(0, 1))
+    for i in range(0, len(grid), len(grid) // 10):
+        alone = simulate(scene, grid=grid[i : i + 1], sensitivity=keys).sensitivity
+        assert alone is not None
+        assert (np.abs(several.state_rates[i] - alone.state_rates[0]) <= 1e-13 * largest).all()
+
+
 def test_an_output_exactly_at_a_stick_has_the_derivatives_before_it() -> None:
     scene, key = scenes.load("friction_slide"), "object_friction.coulomb_N"
     run = simulate(scene, grid=[3.0, 3.01], sensitivity=[key])
