@@ -101,7 +101,7 @@ def describe_sensitivity(found: Sensitivity) -> Iterable[Row]:
             what = f"{event['kind'].lower()} {event['body'].lower()}"
             yield f"  {what} at {event['time_s']:.6g} s", f"{event['rate']:.12g} s"
     if found.corner is not None:
-        yield "one-sided derivatives differ", f"from t = {found.corner:.6g} s on"
+        yield "one-sided derivatives differ", f"from t = {found.corner:.6g} s on: {found.corner_reason}"
 
 
 def last_rates(found: Sensitivity) -> dict[str, dict[str, Any]]:
@@ -109,7 +109,7 @@ def last_rates(found: Sensitivity) -> dict[str, dict[str, Any]]:
     level_rates = found.V_c_rates[-1]
     return {
         key: {"t": found.t[-1], "state": found.state_rates[-1, :, place], "V_c": level_rates[place],
-              "corner": found.corner, "events": [
+              "corner": found.corner, "corner_reason": found.corner_reason, "events": [
                   {"time_s": event[Entry.TIME], "kind": Transition(int(event[Entry.KIND])).name,
                    "body": Body(int(event[Entry.BODY])).name, "rate": rate}
                   for event, rate in zip(found.event_table, found.event_rates[:, place], strict=True)]}

@@ -11,10 +11,12 @@ from __future__ import annotations
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.compilation.vectors import HALF, add_product, highest, larger, load_half, spread_half, store
+from grasp_ros.exact.impact import damping_factor, elastic_slope
+from grasp_ros.exact.kinematics import approach
 from grasp_ros.exact.numerics.polynomial import INVERSE
 from grasp_ros.exact.records import Array
 from grasp_ros.physics.impact_law import EXPONENT
-from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Of, Pair, V, X, Z
+from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Of, Pair, U, V, X, Z
 from grasp_ros.sensitivity.tangents import AHEAD, BLOCK, STATES, STEP, WEIGHTS, Row, Tangents, Weight
 
 MOST_HALVINGS = 200
@@ -254,3 +256,25 @@ def exact_length(t: Tangents, n: int, s: float) -> float:
             ):
                 s, halvings = 0.5 * s, halvings + 1
     return s
+
+
+@kernel
+def add_neglected(t: Tangents, side: Body, span: float) -> None:
+    """Add the slope of the force of a pair that begins or leaves: its impulse is below rounding, its slope is not.
+
+    It begins from u = 0, or leaves to it, by a power of the time.
+    """
+    u, after, arm = t.before[U.L + side], t.y[U.L + side], velocity_lane(side)
+    deepest = max(u, after)
+    if deepest <= 0.0:
+        return
+    rate = approach(t.y if after > u else t.before, side)
+    factor = max(damping_factor(t.pairs[side, Law.DISSIPATION], rate), 0.0)
+    slope = elastic_slope(t.pairs[side, Law.HERTZIAN], deepest)
+    mean = slope / (1.0 + (EXPONENT - 1.0) * abs(rate) * span / deepest)  # for u = a t^n
+    impulse = span * factor * mean
+    arm_mass, mass = t.bodies[side, Of.MASS], t.bodies[OBJECT, Of.MASS]
+    for j in range(t.x.shape[1]):
+        apart = t.x[arm - 1, j] - t.x[X.O, j]
+        t.x[arm, j] -= impulse * apart / arm_mass
+        t.x[V.O, j] += impulse * apart / mass

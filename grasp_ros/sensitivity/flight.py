@@ -172,8 +172,8 @@ def drive_at_rest(t: Tangents, body: Body, j: int) -> float:
 
 
 @kernel
-def rest_tangent(t: Tangents, span: float) -> None:
-    """Write the tangents after `span` s at rest to `at`."""
+def write_flow_at_rest(t: Tangents, span: float) -> None:
+    """Write the flow of `span` s at rest and its integral to the second and third of `matrices`."""
     a, flow, integral, term, spare = t.matrices[0], t.matrices[1], t.matrices[2], t.matrices[3], t.matrices[4]
     times = halvings(rate_at_rest(t, a), span)
     h = span * power_of_two(-times)
@@ -195,6 +195,12 @@ def rest_tangent(t: Tangents, span: float) -> None:
                 integral[i, j] += spare[i, j]
         product_6x6(flow, flow, spare)
         copy_matrix(flow, spare)
+
+
+@kernel
+def rest_tangent(t: Tangents) -> None:
+    """Write the tangents after a time at rest, whose flow is there, to `at`."""
+    flow, integral = t.matrices[1], t.matrices[2]
     for j in range(t.x.shape[1]):
         left, right = drive_at_rest(t, LEFT, j), drive_at_rest(t, RIGHT, j)
         middle = drive_at_rest(t, OBJECT, j)

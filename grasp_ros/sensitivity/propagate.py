@@ -16,18 +16,28 @@ from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import door, kernel
 from grasp_ros.exact.driver.callback import FINISH, REST
 from grasp_ros.exact.driver.intervals import feedback, measured
-from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
+from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, surface_factor
 from grasp_ros.exact.numerics.polynomial import invert_time
 from grasp_ros.exact.numerics.roots import shift, value_and_rate
 from grasp_ros.exact.records import Order, Step
 from grasp_ros.exact.tolerances import SURFACE
 from grasp_ros.physics.control import Column
-from grasp_ros.physics.impact_law import EXPONENT
-from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, Slide, U, V, X
-from grasp_ros.sensitivity.contact import exact_length, expand_tangents, step_tangents, touches
-from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent, write_flows
-from grasp_ros.sensitivity.tangents import UNSEEN, Count, Number, Tangents, copy_matrix, tangents_at
+from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, Slide, U, V, X
+from grasp_ros.sensitivity.contact import add_neglected, exact_length, expand_tangents, step_tangents, touches
+from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent, write_flow_at_rest, write_flows
+from grasp_ros.sensitivity.tangents import (
+    UNSEEN,
+    Corner,
+    Count,
+    Number,
+    Tangents,
+    copy_matrix,
+    note_corner,
+    tangents_at,
+)
+
+SAME = 16.0 * EPS  # of the time: steps that differ by less are equal, and the sum of the differences stays below
 
 
 @kernel
@@ -98,12 +108,12 @@ def pass_friction(t: Tangents, at_tick: bool) -> None:
     Where the object turns, that is its acceleration after the turn by that before it. It is nan where the one-sided
     derivatives differ. Where an object stops just when inputs change, it is undecided which of them would act on it.
     """
-    before, now, factor = t.counts[Count.SLIDE], t.mode[OBJECT], 1.0
+    before, now, factor, why = t.counts[Count.SLIDE], t.mode[OBJECT], 1.0, Corner.TURN
     if now == Slide.FREE or now == before:
         return
     slid = before == Slide.RIGHTWARD or before == Slide.LEFTWARD
     if slid and at_tick:
-        factor = math.nan
+        factor, why = math.nan, Corner.STOP
     elif now == Slide.STUCK:
         factor = 0.0
     elif slid:
@@ -112,9 +122,9 @@ def pass_friction(t: Tangents, at_tick: bool) -> None:
         first = push + t.numbers[Number.FORCE]  # under the constant force before
         factor = (push + new[Of.FORCE]) / first if first != 0.0 else math.nan
     elif before == UNSEEN and t.before[V.O] == 0.0 and t.x[V.O].any():
-        factor = math.nan
+        factor, why = math.nan, Corner.START
     if math.isnan(factor):
-        t.numbers[Number.CORNER] = min(t.numbers[Number.CORNER], t.numbers[Number.TIME])
+        note_corner(t, t.numbers[Number.TIME], why)
         return
     for j in range(t.x.shape[1]):
         t.x[V.O, j] *= factor
@@ -135,7 +145,7 @@ def check_glide(t: Tangents) -> None:
         for j in range(t.x.shape[1]):
             faster = sign * (t.x[arm, j] - t.x[V.O, j])
             if t.law[side, Law.DISSIPATION, j] * d + loss * faster != 0.0:
-                t.numbers[Number.CORNER] = 0.0
+                note_corner(t, 0.0, Corner.GLIDE)
 
 
 @kernel
@@ -165,28 +175,6 @@ def next_output(t: Tangents) -> float:
 def since(t: Tangents, begin: float, span: float) -> float:
     """Time from a begin to the next output, within a span."""
     return min(max(next_output(t) - begin, 0.0), span)
-
-
-@kernel
-def add_neglected(t: Tangents, side: Body, span: float) -> None:
-    """Add the slope of the force of a pair that begins or leaves: its impulse is below rounding, its slope is not.
-
-    It begins from u = 0, or leaves to it, by a power of the time.
-    """
-    u, after, arm = t.before[U.L + side], t.y[U.L + side], velocity_lane(side)
-    deepest = max(u, after)
-    if deepest <= 0.0:
-        return
-    rate = approach(t.y if after > u else t.before, side)
-    factor = max(damping_factor(t.pairs[side, Law.DISSIPATION], rate), 0.0)
-    slope = elastic_slope(t.pairs[side, Law.HERTZIAN], deepest)
-    mean = slope / (1.0 + (EXPONENT - 1.0) * abs(rate) * span / deepest)  # for u = a t^n
-    impulse = span * factor * mean
-    arm_mass, mass = t.bodies[side, Of.MASS], t.bodies[OBJECT, Of.MASS]
-    for j in range(t.x.shape[1]):
-        apart = t.x[arm - 1, j] - t.x[X.O, j]
-        t.x[arm, j] -= impulse * apart / arm_mass
-        t.x[V.O, j] += impulse * apart / mass
 
 
 @kernel
@@ -228,15 +216,29 @@ def pass_step(t: Tangents, begin: float, span: float, s: float, unit: float, n: 
 
 
 @kernel
+def rest(t: Tangents, begin: float, span: float) -> None:
+    """Move the tangents over a time at rest, from output to output: equal steps have one flow."""
+    passed, step, end = 0.0, math.nan, t.numbers[Number.TIME]
+    while next_output(t) <= end:
+        left = since(t, begin, span) - passed
+        if not abs(left - step) <= SAME * end:
+            step = left
+            write_flow_at_rest(t, step)
+        rest_tangent(t)
+        copy_matrix(t.x, t.at)
+        write_output(t)
+        passed += step
+    write_flow_at_rest(t, span - passed)
+    rest_tangent(t)
+
+
+@kernel
 def pass_segment(t: Tangents, kind: int, begin: float, span: float, s: float, unit: float, n: int) -> None:
     """Move the tangents over a segment, or over a time at rest, and write the outputs on the way."""
     end = t.numbers[Number.TIME]
     act(t)
     if kind == REST:
-        while next_output(t) <= end:
-            rest_tangent(t, since(t, begin, span))
-            write_output(t)
-        rest_tangent(t, span)
+        rest(t, begin, span)
     elif kind == Kind.FLIGHT:
         while next_output(t) < end:
             fly_free(t, False, since(t, begin, span))
@@ -274,7 +276,7 @@ def propagate(address: int, kind: int, span: float, s: float, unit: float, degre
     while counts[Count.TICK] < last:  # the ticks up to the begin of the interval
         counts[Count.TICK] += 1
         if enter_tick(t, counts[Count.TICK]):
-            t.numbers[Number.CORNER] = min(t.numbers[Number.CORNER], counts[Count.TICK] * period)
+            note_corner(t, counts[Count.TICK] * period, Corner.LIMIT)
     t.numbers[Number.TIME] = now + interval + (span if kind == REST else 0.0)
     pass_segment(t, kind, since_tick + interval, span, s, unit, degree)
     t.counts[Count.SLIDE], t.numbers[Number.FORCE] = t.mode[OBJECT], t.bodies[OBJECT, Of.FORCE]

@@ -13,7 +13,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.directions import Directions
 from grasp_ros.sensitivity.propagate import propagate
-from grasp_ros.sensitivity.tangents import Count, Number, tangents_of
+from grasp_ros.sensitivity.tangents import CORNERS, Corner, Count, Number, tangents_of
 
 
 class Carrier(Observer):
@@ -45,3 +45,8 @@ class Carrier(Observer):
         """First time in s at which one-sided derivatives differ; None: there is none."""
         corner = float(self.memory.numbers[Number.CORNER])
         return corner if math.isfinite(corner) else None
+
+    @property
+    def corner_reason(self) -> str | None:
+        """Why they differ there."""
+        return None if self.corner is None else CORNERS[Corner(self.memory.counts[Count.CORNER])]

@@ -64,6 +64,7 @@ class Count(IntEnum):
     TICK = 1  # whose inputs act; -1: none yet
     DRIVEN = 2  # whether inputs change at ticks
     SLIDE = 3  # mode of the object in the last segment; UNSEEN: there was none
+    CORNER = 4  # why one-sided derivatives differ, see `Corner`
 
 
 class Number(IntEnum):
@@ -73,6 +74,25 @@ class Number(IntEnum):
     PERIOD = 1  # control period, s
     CORNER = 2  # first time at which one-sided derivatives differ, s; inf: none
     FORCE = 3  # constant force on the object in the last segment, its friction in it, N
+
+
+class Corner(IntEnum):
+    """Why one-sided derivatives differ."""
+
+    START = 0
+    GLIDE = 1
+    LIMIT = 2
+    STOP = 3
+    TURN = 4
+
+
+CORNERS = {  # in words
+    Corner.START: "the object starts at rest under a force beyond its friction",
+    Corner.GLIDE: "a pair starts at u' = -1/p and nothing moves it off",
+    Corner.LIMIT: "a command is just at its limit",
+    Corner.STOP: "the object stops just when inputs change",
+    Corner.TURN: "the object turns where it could as well stay",
+}
 
 
 class Tangents(NamedTuple):
@@ -148,6 +168,13 @@ def tangents_of(plant: Plant, state: State, changes: Directions, times: Array, e
 
 
 tangents_at = reader(typeof(tangents_of(*new_run()[2:], no_directions(1), np.zeros(0), 0)))
+
+
+@kernel
+def note_corner(t: Tangents, time: float, why: int) -> None:
+    """Keep the first time in s at which one-sided derivatives differ, and why."""
+    if time < t.numbers[Number.CORNER]:
+        t.numbers[Number.CORNER], t.counts[Count.CORNER] = time, why
 
 
 @kernel

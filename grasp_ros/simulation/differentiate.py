@@ -44,7 +44,7 @@ class Sensitivity(Frozen):
     event_table : array (e, 5)
         As in a trajectory: time in s, body, kind, u in m and u' in m/s.
     state_rates : array (m, 6, n)
-        Derivatives of the states at fixed times.
+        Derivatives of the states at fixed times; exactly at a STICK those of the motion before it.
     event_rates : array (e, n), s
         Derivatives of the times of the events; infinite at a touch without speed, 0 where an input that changes makes
         the event.
@@ -52,6 +52,8 @@ class Sensitivity(Frozen):
         Time in s from which on one-sided derivatives differ, because an object under dry friction turns where it could
         as well stay, or stops just when inputs change, a pair begins at u' = -1/p and nothing moves it off, or a
         command is just at its limit; None: nowhere. An object that friction just holds, to the last digit, is missed.
+    corner_reason : str or None
+        Which of these, in words.
     """
 
     scene: Scene
@@ -62,6 +64,7 @@ class Sensitivity(Frozen):
     state_rates: Array
     event_rates: Array
     corner: float | None
+    corner_reason: str | None
 
     @property
     def V_c(self) -> Array:
@@ -98,7 +101,8 @@ def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
     at_events = event_rates(scene, changes, sampled, events, Moments(states[m:], carrier.out[m:], carrier.forces))
     states[:, system.absent_columns] = carrier.out[:, system.absent_columns] = np.nan
     check_same(run, grid, states[:m], integrator.event_table)
-    return Sensitivity(scene, tuple(keys), grid, states[:m], events, carrier.out[:m], at_events, carrier.corner)
+    return Sensitivity(scene, tuple(keys), grid, states[:m], events, carrier.out[:m], at_events, carrier.corner,
+                       carrier.corner_reason)
 
 
 def complete(scene: Scene, integrator: Integrator, sampled: bool, times: Array) -> Array:

@@ -1,6 +1,7 @@
 """Regression scenes: each failed a check once; what is right by the reference, and how far the product is from it.
 
-`lab/cases/regression` holds the scenes and the answers to those whose motion can be compared.
+`lab/cases/regression` holds the scenes and the answers to those whose motion can be compared, `lab/cases/outside` those
+that the domain excludes.
 `python -m lab.cases.regression NAME ...` writes the answers to some of them.
 """
 
@@ -8,6 +9,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -19,7 +21,7 @@ from gmpy2 import mpfr
 from grasp_ros import scene as scenes
 from grasp_ros.cli.parser import Parser
 from grasp_ros.exact.integrator import Status
-from grasp_ros.physics.domain import LARGEST_POSITION
+from grasp_ros.physics.domain import LARGEST_POSITION, RULES
 from grasp_ros.physics.layout import EPS
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
@@ -29,6 +31,7 @@ from lab.oracles.rounding_bounds import largest, rates
 from lab.reference import integrate
 
 SCENES = Path(__file__).with_name("regression")
+OUTSIDE = SCENES.with_name("outside")
 ANSWERS = SCENES / "answers.json"
 DIGITS = 25
 STEPS = 2_500  # of the reference; where it needs more the answer ends earlier
@@ -67,6 +70,19 @@ def load(name: str) -> Scene:
     return scenes.load(str(SCENES / f"{name}.yaml"))
 
 
+def refusals() -> Counter[tuple[str, str]]:
+    """How many scenes of OUTSIDE each rule of the domain refuses, by its ratio or its key, and what is allowed."""
+    found: Counter[tuple[str, str]] = Counter()
+    for path in sorted(OUTSIDE.glob("*.yaml")):
+        try:
+            scenes.load(str(path))
+        except SceneError as refusal:
+            _, key, sentence = str(refusal).split(": ", 2)
+            rule = next((rule.text for rule in RULES if rule.text in sentence), f"`{key.partition('.')[2]}`")
+            found[rule, sentence.partition("; allowed: ")[2]] += 1
+    return found
+
+
 def answers() -> dict[str, Answer]:
     """All answers by the name of their scene."""
     return {name: Answer(**fields) for name, fields in json.loads(ANSWERS.read_text(encoding="utf-8")).items()}
@@ -85,7 +101,7 @@ def answer(scene: Scene) -> Answer:
     times = sorted(halves | {scene.duration * k / PARTS for k in range(1, PARTS)})
     right = integrate(scene, times, DIGITS, budget=STEPS)
     small = [row for row in right.state if max(map(abs, row)) < LARGE]
-    drawn = [integrate(moved, times[: len(small)], DRAWN_DIGITS, budget=STEPS).state for moved in _moved(scene)]
+    drawn = [integrate(moved, times[: len(small)], DRAWN_DIGITS, budget=STEPS).state for moved in nearby(scene, DRAWS)]
     amplification = []
     for row, *changed in zip(small, *drawn, strict=False):
         changes = np.array([[float(a - b) for a, b in zip(draw, row, strict=True)] for draw in changed])
@@ -122,13 +138,13 @@ def _relative(changes: Array, size: Array) -> Array:
         return np.where(changes == 0.0, 0.0, np.abs(changes) / size)
 
 
-def _moved(scene: Scene) -> list[Scene]:
-    """The scene with some of its numbers smaller by one rounding, DRAWS times, where scenes may be so."""
+def nearby(scene: Scene, draws: int) -> list[Scene]:
+    """The scene with some of its numbers smaller by one rounding, drawn so often, where scenes may be so."""
     found: list[Scene] = []
     for seed in range(TRIES):
         with suppress(SceneError):  # k + Kp = 0 must not become negative
             found.append(scene.changed(_changes(scene, np.random.default_rng(seed))))
-        if len(found) == DRAWS:
+        if len(found) == draws:
             break
     return found
 

@@ -16,6 +16,7 @@ from grasp_ros.exact.events import Event
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
+from lab.cases import regression
 from lab.cases.case import Case, Product, Unfinished, Verdict, evaluate
 from lab.cases.families import ORDER
 from lab.cases.registry import cases
@@ -82,8 +83,15 @@ def run(docs: Path | None, alone: bool) -> int:
                           for row in rows), docs / "hard.csv")
         pages.write(docs, "hard", rows=rows, right=right, names=names[1:], others=others,
                     compared=_compared(others, rows), families=ORDER, results=_results(rows, len(others)),
-                    seconds=SECONDS, far=FAR)
+                    seconds=SECONDS, far=FAR, **regression_numbers())
     return 0 if right == len(rows) else 1
+
+
+def regression_numbers() -> dict[str, object]:
+    """How many regression scenes there are, how many have an answer, and how many each rule of the domain refuses."""
+    refused = regression.refusals()
+    return {"inside": len(regression.names()), "answered": len(regression.answers()), "outside": refused.total(),
+            "refused": [[*rule, str(count)] for rule, count in refused.most_common()]}
 
 
 def _other(case: Case, other: Other) -> Verdict:

@@ -19,6 +19,7 @@ from grasp_ros.exact.automaton.friction import apply_friction
 from grasp_ros.exact.automaton.modes import initial_modes
 from grasp_ros.exact.kinematics import other
 from grasp_ros.exact.records import Array
+from grasp_ros.exact.tolerances import FORCE_FREE
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, Slide, Transition, U, V, Work, X
 from grasp_ros.physics.model import Contact
 from grasp_ros.physics.system import COLUMN
@@ -243,6 +244,16 @@ def test_a_pair_that_turns_back_leaves_out_no_contact(side: Body, hertzian: floa
         u, rate = part * t + 0.5 * push * (part * t) ** 2, 1.0 + push * part * t
         assert rate > 0.0
         assert leaves_force_out(b.plant, side, u, rate, 1.0)
+
+
+@SIDES
+@pytest.mark.parametrize("rate", [-1e3, 1e-6, 1e-3, 1e3])
+def test_the_impulse_that_is_left_out_is_the_force_times_the_time_since_u_was_0(side: Body, rate: float) -> None:
+    """H u^(3/2) u / |u'|, beside 0.5 kg times the larger of |u'| and 1 m/s."""
+    b = bench(side, 0.0, rate, Pair.BEGINNING, p=0.0)
+    for part in (0.9, 1.1):
+        u = (part * FORCE_FREE * 0.5 * max(abs(rate), 1.0) * abs(rate) / 1e4) ** 0.4
+        assert leaves_force_out(b.plant, side, u, rate, 1.0) is (part < 1.0)
 
 
 @SIDES

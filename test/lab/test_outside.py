@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.scene import SceneError
-from lab import cases
+from lab.cases.regression import OUTSIDE as DIRECTORY
+from lab.cases.regression import refusals
 
-DIRECTORY = Path(cases.__file__).parent / "outside"
 OUTSIDE = {  # what the refusal says: the scenes
     "_arm.mass_kg: mass of the arm / mass of the object": (
         "chain_feed_forward_tilt_1", "chain_tilt_1", "falls_back_between_roundings", "heavy_arm_behind_a_glide",
@@ -46,6 +44,7 @@ RULES = [(words, name) for words, names in OUTSIDE.items() for name in names]
 
 def test_the_table_is_complete() -> None:
     assert sorted(name for _, name in RULES) == sorted(path.stem for path in DIRECTORY.glob("*.yaml"))
+    assert sorted(refusals().values()) == sorted(map(len, OUTSIDE.values()))
 
 
 @pytest.mark.parametrize(("words", "name"), RULES, ids=[name for _, name in RULES])

@@ -26,7 +26,7 @@ from grasp_ros.simulation import GRID_POINTS
 from lab.cases.registry import cases
 from lab.drills.faults import run as faults
 from lab.paper import page as paper
-from lab.studies import accuracy, certificate, derivatives, domain, effects, pages
+from lab.studies import accuracy, certificate, derivatives, domain, effects, hard, pages
 
 DOCS = Path(__file__).parents[2] / "docs"
 ALLOWED = timedelta(days=30)
@@ -133,6 +133,12 @@ def test_the_work_of_each_accuracy_is_that_of_the_code() -> None:
 def test_the_hard_cases_are_those_of_the_code() -> None:
     rows = [(row["family"], row["case"], row["promised"]) for row in table("hard")]
     assert rows == [(case.family.name, case.name, f"{case.bound:.1g}") for case in cases()]
+
+
+def test_the_regression_scenes_are_counted() -> None:
+    numbers = hard.regression_numbers()
+    assert cells("hard", "rule") == numbers["refused"]
+    assert f"{numbers['inside']} of them are inside" in page("hard")
 
 
 def test_the_faults_are_those_of_the_code() -> None:

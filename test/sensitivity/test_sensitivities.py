@@ -135,9 +135,34 @@ def test_an_object_that_stops_just_when_inputs_change_is_flagged() -> None:
     """It stops after 0.5 s, when the pulse begins to push it back."""
     scene = made(1.0, 0.1, object=body(v=0.25), object_friction={"coulomb_N": 0.5},
                  object_pulse={"force_N": -1.0, "start_s": 0.5, "length_s": 0.2})
-    assert derivatives(scene, "object.velocity_m_per_s").corner == pytest.approx(0.5)
+    found = derivatives(scene, "object.velocity_m_per_s")
+    assert found.corner == pytest.approx(0.5)
+    assert found.corner_reason == "the object stops just when inputs change"
     later = scene.changed({"object_pulse.start_s": 0.6})
     assert derivatives(later, "object.velocity_m_per_s").corner is None
+
+
+@pytest.mark.parametrize("grid", [np.linspace(0.0, 10.0, 501), np.geomspace(1e-3, 10.0, 50)])
+def test_outputs_at_rest_have_the_derivatives_that_they_have_alone(grid: np.ndarray) -> None:
+    """Equal steps from output to output have one flow."""
+    keys = ["left_arm.mass_kg", "left_arm.stiffness_N_per_m", "left_feedback.set_point_m"]
+    scene = scenes.load("preload")
+    several = simulate(scene, grid=grid, sensitivity=keys).sensitivity
+    assert several is not None
+    largest = np.abs(several.state_rates).max(axis=(0, 1))
+    for i in range(0, len(grid), len(grid) // 10):
+        alone = simulate(scene, grid=grid[i : i + 1], sensitivity=keys).sensitivity
+        assert alone is not None
+        assert (np.abs(several.state_rates[i] - alone.state_rates[0]) <= 1e-13 * largest).all()
+
+
+def test_an_output_exactly_at_a_stick_has_the_derivatives_before_it() -> None:
+    scene, key = scenes.load("friction_slide"), "object_friction.coulomb_N"
+    run = simulate(scene, grid=[3.0, 3.01], sensitivity=[key])
+    assert run.events[-1].time == 3.0
+    assert run.sensitivity is not None
+    assert run.sensitivity.state_rates[:, 3, 0].tolist() == [pytest.approx(-1.5), 0.0]
+    assert (run.sensitivity.corner, run.sensitivity.corner_reason) == (None, None)
 
 
 def test_the_first_state_of_an_object_that_sticks_at_once_follows_what_it_begins_with() -> None:
@@ -240,18 +265,23 @@ def test_an_object_that_could_as_well_stay_is_flagged(command: Any, tmp_path: Pa
     scene = made(0.1, 0.001, object=body(), left_arm=body(1.0, -1.0), object_friction={"coulomb_N": 0.2},
                  tilt={"angle_rad": 0.1, "gravity_m_per_s2": 9.81})
     assert derivatives(scene, "object.velocity_m_per_s").corner == 0.0
+    words = "the object starts at rest under a force beyond its friction"
     assert derivatives(scene, "object_friction.coulomb_N").corner is None
     (tmp_path / "corner.yaml").write_text(scene.to_yaml(), "utf-8")
     key = "object.velocity_m_per_s"
-    found = json.loads(command("simulate", "corner.yaml", "--sensitivity", key, "--json").stdout)["sensitivity"][key]
-    assert (found["corner"], found["events"]) == (0.0, [])
+    asked = "simulate", "corner.yaml", "--sensitivity", key
+    found = json.loads(command(*asked, "--json").stdout)["sensitivity"][key]
+    assert (found["corner"], found["corner_reason"], found["events"]) == (0.0, words, [])
+    assert f"from t = 0 s on: {words}" in " ".join(command(*asked).stdout.split())
 
 
 @pytest.mark.parametrize(("limit", "corner"), [(1.5, 0.0), (1.4, None), (1.6, None)])
 def test_a_command_just_at_its_limit_is_flagged(limit: float, corner: float | None) -> None:
     scene = scenes.load("case_01", ["time.duration_s=0.01", "loop={}", f"left_actuator.limit_N={limit}"])
     assert scene.system.laws[LEFT].command(0, scene.initial_state[0], 0.0) == min(limit, 1.5)
-    assert derivatives(scene, "left_arm.position_m").corner == corner
+    found = derivatives(scene, "left_arm.position_m")
+    assert found.corner == corner
+    assert found.corner_reason == (None if corner is None else "a command is just at its limit")
 
 
 def test_what_is_printed_as_data_are_the_derivatives(command: Any) -> None:
@@ -267,7 +297,9 @@ def test_a_pair_that_glides_where_its_force_ends_is_flagged(stiffness: float, co
     """At u' = -1/p for good: a smaller p gives a force, a larger one none."""
     scene = made(0.01, 0.001, object=body(), left_arm=body(1.0, 0.5, -4.0, stiffness_N_per_m=stiffness),
                  left_contact={"hertz_N_per_m1_5": 100.0, "dissipation_s_per_m": 0.25})
-    assert derivatives(scene, P).corner == corner
+    found = derivatives(scene, P)
+    assert found.corner == corner
+    assert found.corner_reason == (None if corner is None else "a pair starts at u' = -1/p and nothing moves it off")
     assert derivatives(scene, "left_arm.position_m").corner is None
 
 

@@ -1,0 +1,166 @@
+"""When an object under dry friction stops or slips, and bounds that prove that it does not."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from exact.bench import SIDES, bench
+
+from grasp_ros.exact.automaton.friction import (
+    apply_friction,
+    lift_friction,
+    slide_in_contact,
+    slide_in_flight,
+    stays_stuck,
+)
+from grasp_ros.exact.compilation.jit import COMPILED
+from grasp_ros.exact.contact.step_unit import higher_order, new_settings
+from grasp_ros.exact.contact.taylor_step import take_step
+from grasp_ros.exact.driver.workspace import new_workspace
+from grasp_ros.exact.numerics.polynomial import curvatures, values
+from grasp_ros.exact.records import Array, Plant, State, Tables
+from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Of, Pair, Slide, V, Work, Z
+from grasp_ros.physics.model import Contact, impact_force
+
+TOLERANCE, ORDER = 1e-16, 34
+DRAWS, PLACES = (400, 100) if COMPILED else (8, 12)
+
+
+def held(random: np.random.Generator) -> tuple[Plant, State]:
+    """An object that sticks between two arms, of which one or both press."""
+    given = np.zeros((3, 4))
+    given[:, Of.MASS], given[:, Of.STIFFNESS] = random.uniform(0.2, 5.0, 3), random.uniform(0.0, 50.0, 3)
+    given[:, Of.DAMPING], given[:, Of.FORCE] = random.uniform(0.0, 2.0, 3), random.normal(0.0, 2.0, 3)
+    given[OBJECT, Of.STIFFNESS] = 0.0
+    pairs = np.column_stack([10.0 ** random.uniform(3.0, 6.0, 2), random.uniform(0.0, 2.0, 2)])
+    u = 10.0 ** random.uniform(-6.0, -2.0, 2) * random.choice([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0]])
+    rate = np.where(u > 0.0, random.uniform(-0.4, 0.4, 2), 0.0)
+    y = np.array([u[LEFT], rate[LEFT], 0.0, 0.0, -u[RIGHT], -rate[RIGHT], *u])
+    modes = np.array([*np.where(u > 0.0, Pair.CONTACT, Pair.OPEN), Slide.STUCK])
+    plant = Plant(given, given.copy(), pairs, 0.0, given[:, Of.FORCE].copy())
+    apply_friction(plant, modes)
+    return plant, State(y, modes, np.zeros(6), np.zeros(3), np.zeros(3))
+
+
+def push_at(tables: Tables, plant: Plant, state: State, n: int, s: float) -> float:
+    """The force on the object beside its friction at a place of a step, N, by the impact law."""
+    values(tables.c, n, s, tables.at)
+    push = plant.given[OBJECT, Of.FORCE]
+    for side, v, sign in ((LEFT, V.L, 1.0), (RIGHT, V.R, -1.0)):
+        if state.mode[side] == Pair.CONTACT:
+            depth = np.square(max(tables.at[Z.L + side], 0.0))
+            push += sign * impact_force(Contact(*plant.pairs[side]), depth, sign * tables.at[v])
+    return float(push)
+
+
+def pushes(tables: Tables, plant: Plant, state: State, n: int, h: float) -> Array:
+    """The same at many places."""
+    return np.array([push_at(tables, plant, state, n, s) for s in np.linspace(0.0, h, PLACES)])
+
+
+@SIDES
+@pytest.mark.parametrize("drag", [0.0, 0.5])
+def test_a_sliding_object_stops_in_flight_where_its_speed_ends(side: Body, drag: float) -> None:
+    """v' = -5 - c v, from 0.3 m/s."""
+    b = bench(side, -1.0, 0.0, coulomb=5.0, object_speed=0.3,
+              slide=Slide.RIGHTWARD if side == LEFT else Slide.LEFTWARD)
+    b.plant.given[OBJECT, Of.DAMPING] = b.plant.bodies[OBJECT, Of.DAMPING] = drag
+    apply_friction(b.plant, b.state.mode)
+    found = slide_in_flight(b.plant, b.state)
+    assert found.what == Slide.STUCK
+    assert found.when == pytest.approx(math.log1p(0.3 * drag / 5.0) / drag if drag else 0.06, rel=1e-14)
+
+
+@SIDES
+@pytest.mark.parametrize(("slide", "speed", "push", "coulomb"), [
+    (Slide.FREE, 0.3, -1.0, 0.0), (Slide.RIGHTWARD, 0.0, 1.0, 5.0), (Slide.RIGHTWARD, 0.3, 5.0, 5.0),
+    (Slide.RIGHTWARD, 0.3, 6.0, 5.0), (Slide.STUCK, 0.0, 1.0, 5.0),
+])
+def test_what_is_free_at_rest_or_driven_does_not_stop_in_flight(
+    side: Body, slide: Slide, speed: float, push: float, coulomb: float
+) -> None:
+    mirrored = side == RIGHT and slide == Slide.RIGHTWARD
+    b = bench(side, -1.0, 0.0, coulomb=coulomb, object_speed=speed, object_push=push,
+              slide=Slide.LEFTWARD if mirrored else slide)
+    apply_friction(b.plant, b.state.mode)
+    assert slide_in_flight(b.plant, b.state).when == math.inf
+
+
+def stuck_step(random: np.random.Generator) -> tuple[Tables, Plant, State, int, float]:
+    """A Taylor step beside a stuck object, its order and its length."""
+    plant, state = held(random)
+    tables, settings = new_workspace(ORDER).tables, new_settings(TOLERANCE, higher_order(ORDER), plant.given)
+    segment = take_step(tables, plant, state, settings, np.inf, np.zeros(len(Work), dtype=np.int64))
+    return tables, plant, state, segment.step.order.number, segment.s
+
+
+@pytest.mark.parametrize("part", [0.0, 0.5])
+def test_a_stuck_object_slips_where_the_impacts_overcome_the_friction(part: float) -> None:
+    """At once if they do at the begin, and not at all below it."""
+    random, slips, work = np.random.default_rng(5), 0, np.zeros(len(Work), dtype=np.int64)
+    for _ in range(DRAWS):
+        tables, plant, state, n, h = stuck_step(random)
+        along = np.abs(pushes(tables, plant, state, n, h))
+        released = (tables.at[[Z.L, Z.R]] <= 0.0) & (state.mode[:OBJECT] == Pair.CONTACT)
+        if along.max() <= 1.01 * along[0] or released.any():
+            continue
+        for coulomb in ((1.0 - part) * along[0] + part * along.max(), 1.1 * along.max(), 0.9 * along[0]):
+            values(tables.c, n, h, tables.at)
+            held_by = plant._replace(coulomb=coulomb)
+            found = slide_in_contact(tables, held_by, state, n, h, work)
+            if coulomb > along.max():
+                assert not found.when <= h
+                continue
+            push = push_at(tables, plant, state, n, found.when)
+            assert found.what == (Slide.RIGHTWARD if push > 0.0 else Slide.LEFTWARD)
+            if coulomb < along[0]:
+                assert found.when < 1e-20 * h
+                continue
+            assert abs(push) == pytest.approx(coulomb, rel=1e-10)
+            assert (along[np.linspace(0.0, h, PLACES) < found.when] <= coulomb * (1.0 + 1e-10)).all()
+            slips += 1
+    assert slips > 0.1 * DRAWS
+
+
+@pytest.mark.parametrize("part", [1.0, 1e-2])
+def test_an_object_is_held_by_bounds_where_no_impact_overcomes_the_friction(part: float) -> None:
+    random, proved, work = np.random.default_rng(5), 0, np.zeros(len(Work), dtype=np.int64)
+    for _ in range(DRAWS):
+        plant, state = held(random)
+        settings = new_settings(TOLERANCE, higher_order(ORDER), plant.given)
+        tables = new_workspace(ORDER).tables
+        segment = take_step(tables, plant, state, settings, np.inf, work)
+        n, h = segment.step.order.number, part * segment.s
+        push = np.abs(pushes(tables, plant, state, n, h)).max()
+
+        def holds(coulomb: float, n: int = n, h: float = h, tables: Tables = tables, plant: Plant = plant,
+                  mode: Array = state.mode) -> bool:
+            values(tables.c, n, h, tables.at)
+            curvatures(tables.c, n, h, tables.size)
+            return stays_stuck(tables, plant._replace(coulomb=coulomb), mode, h)
+
+        assert not holds(push * (1.0 - 1e-9))
+        assert holds(100.0 * push + 1e3)
+        proved += holds(1.3 * push)
+    assert proved > DRAWS * (0.9 if part < 1.0 else 0.1)
+
+
+@pytest.mark.parametrize("slide", [Slide.RIGHTWARD, Slide.LEFTWARD])
+def test_an_object_that_moves_against_the_mode_of_its_friction_stops_at_once(slide: Slide) -> None:
+    random, turned, work = np.random.default_rng(5), 0, np.zeros(len(Work), dtype=np.int64)
+    sign = 1.0 if slide == Slide.RIGHTWARD else -1.0
+    for _ in range(DRAWS):
+        plant, state = held(random)
+        state.mode[OBJECT], state.y[V.O] = slide, -1e-17 * sign  # a rounding: it has stopped a little too late
+        lift_friction(plant)
+        apply_friction(plant, state.mode)
+        tables = new_workspace(ORDER).tables
+        settings = new_settings(TOLERANCE, higher_order(ORDER), plant.given)
+        segment = take_step(tables, plant, state, settings, np.inf, work)
+        if sign * tables.c[LANES + V.O] < 0.0:
+            stop = slide_in_contact(tables, plant, state, segment.step.order.number, segment.s, work)
+            assert stop.when < 1e-15 * segment.s
+            turned += 1
+    assert turned > 0.2 * DRAWS
