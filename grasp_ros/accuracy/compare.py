@@ -40,11 +40,11 @@ def compare(scene: Scene, contenders: Sequence[Contender], truth: Truth, effort:
     spent: dict[Contender, float] = {}
     while climbing and time.monotonic() - begin <= seconds:
         contender = min(climbing, key=lambda one: spent.get(one, effort.patience))
-        started = time.monotonic()
         record = attempt(contender, scene, climbing[contender].pop(0), truth, effort)
         records.append(record)
-        spent[contender] = spent.get(contender, 0.0) + time.monotonic() - started
-        slow = record.status == NOT_INSTALLED or (record.least or record.first) > effort.patience
+        least = record.first if record.least is None else record.least  # a first run may have compiled
+        spent[contender] = spent.get(contender, 0.0) + least * (record.repeats + 1)
+        slow = record.status == NOT_INSTALLED or least > effort.patience
         if slow or not climbing[contender]:
             del climbing[contender]
         if progress is not None:

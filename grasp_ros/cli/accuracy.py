@@ -22,7 +22,8 @@ def add_to(commands: Any) -> None:
     """Add the subcommand."""
     sub = add_command(commands, "accuracy", _accuracy)
     add_scene(sub)
-    sub.add_argument("--error", type=float, metavar="E", help="largest error that you accept, in all states (m, m/s)")
+    sub.add_argument("--error", type=float, metavar="E", help="largest error that you accept, in all states (m, m/s);"
+                     f" default {TARGETS[-1]:g}, without a failure where nothing reaches it")
     sub.add_argument("--budget", type=float, metavar="S", help="longest time in s that a simulation may take")
     sub.add_argument("--seconds", type=float, default=SECONDS, metavar="S",
                      help=f"time in s after which no measurement begins (default {SECONDS:g})")
@@ -35,28 +36,29 @@ def _accuracy(options: argparse.Namespace) -> int:
     if not 0.0 < options.seconds <= MOST_SECONDS:
         raise Refused(f"--seconds {options.seconds!r} is not allowed; allowed: > 0 and <= {MOST_SECONDS:g}")
     wished = options.error is not None or options.budget is not None
-    if wished:
-        check_wish(options.error, options.budget)
+    if not wished:
+        options.error = TARGETS[-1]
+    check_wish(options.error, options.budget)
     check_output(options.output, figure_endings(options.output), options.force, [options.scene])
     contenders, others = own_contenders(scene)
     prepare()
     truth = finest(scene)
     with bar(options.seconds, "s", scene.name) as progress:
         records, late = compare(scene, contenders, truth, seconds=options.seconds, progress=progress)
-    advice = advise(records, options.error, options.budget) if wished else None
+    advice = advise(records, options.error, options.budget)
     again = " ".join([options.scene, *(f"--set {setting}" for setting in options.settings)])
     more = [f"after {options.seconds:g} s not all settings were measured, --seconds allows more: {', '.join(late)}"]
     text = [*_table(truth, records), *(more if late else []), *_not_here(others),
-            *([] if advice is None else _advice(again, options, advice))]
+            *_advice(again, options, advice)]
     show(options, "\n".join(text), {
         "scene": scene.name, "uncertainty": truth.uncertainty, "touches": truth.touches, "not_here": others,
         "unfinished": late, "records": [record._asdict() for record in records],
-        "take": None if advice is None or advice.choice is None else advice.choice._asdict()})
+        "take": advice.choice and advice.choice._asdict()})
     if options.output is not None:
         from grasp_ros.accuracy.figure import error_against_time
 
         write_figure(error_against_time(scene, truth, records, advice, options.error, options.budget), options.output)
-    return 0 if advice is None or advice.choice is not None else 1
+    return 1 if wished and advice.choice is None else 0
 
 
 def _not_here(others: Mapping[str, str]) -> list[str]:
