@@ -1,12 +1,13 @@
 """Mutation check of the automaton and the event search: `python test/exact/mutants.py [part of a name]`, minutes.
 
-Deletes or negates every branch of `modes`, `edge` and `begin` in turn, drops every operand of
-an `and` or `or`, one side of every loop over both sides, and every statement that calls or stores something. A test of
-the file of the same name, test_modes.py ..., must fail for each of these mutants, but for those that do what the
-original does; they are listed with the reason. Everything runs uncompiled, each mutant in a fork.
+Deletes or negates every branch of `modes`, `edge` and `begin` in turn, drops every operand of an `and` or
+`or`, one side of every loop over both sides, and every statement that calls or stores something. A test of its own
+files, MODULES, must fail for each of these mutants, but for those that do what the original does; they are listed with
+the reason. Everything runs uncompiled, each mutant in a fork.
 
 `--sample N [--seed S]` draws N mutants of another kind: a comparison with or without its edge, a sum in place of a
-difference, a product in place of a quotient, a sign dropped, a number doubled; also in the search for events in flight.
+difference, a product in place of a quotient, a sign dropped, a number doubled; also in SAMPLED,
+whose branches are changed only where a part of a name asks for it.
 Many of them change nothing but a rounding or the price: docs/quality.md has those that survived, with reasons.
 """
 
@@ -15,8 +16,10 @@ from __future__ import annotations
 import argparse
 import ast
 import copy
+import importlib
 import os
 import random
+import signal
 import sys
 import types
 from collections.abc import Callable, Iterator
@@ -26,8 +29,13 @@ os.environ["NUMBA_DISABLE_JIT"] = "1"
 sys.path[:0] = map(str, Path(__file__).parents[1:3])  # tests and checkout, whatever is installed
 
 ROOM = "grasp_ros.exact"
-MODULES = ("automaton.modes", "automaton.edge", "automaton.begin")
-SEARCH = {"flight.search": "flight", "numerics.roots": "roots"}  # sampled alone; and whose tests they are
+MODULES = {  # and the files of their tests
+    "automaton.modes": ("modes",), "automaton.edge": ("edge",), "automaton.begin": ("begin",),
+}
+SAMPLED = {  # not every branch is tested there
+    "automaton.friction": ("modes", "friction"), "flight.search": ("flight",), "numerics.roots": ("roots",),
+}
+LONGEST_S = 600  # of the tests of a mutant
 EDGES = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq}
 OPERATIONS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult}
 EQUIVALENT: dict[str, str] = {
@@ -127,13 +135,19 @@ def run_tests(mutant: Mutant) -> int:
     name = f"{ROOM}.{mutant.module}"
     module = types.ModuleType(name)
     exec(compile(mutant.tree, name, "exec"), module.__dict__)
+    own = {id(known): word for word, known in vars(importlib.import_module(name)).items() if callable(known)}
+    for user in [user for user in sys.modules.values() if user.__name__.startswith(ROOM)]:  # who imported its functions
+        for word, known in list(vars(user).items()):
+            if id(known) in own:
+                setattr(user, word, vars(module)[own[id(known)]])
     sys.modules[name] = module
-    tests = Path(__file__).parent / f"test_{SEARCH.get(mutant.module, mutant.module.rpartition('.')[2])}.py"
+    signal.alarm(LONGEST_S)  # a loop that does not end is noticed, too
+    tests = [f"{Path(__file__).parent}/test_{name}.py" for name in {**MODULES, **SAMPLED}[mutant.module]]
     with open(os.devnull, "w") as nowhere:
         os.dup2(nowhere.fileno(), 1)
         os.dup2(nowhere.fileno(), 2)
     quickly = "-m", "not slow", "-k", "not chain"  # chains are runs of minutes where nothing is compiled
-    return int(pytest.main(["-x", "-q", *quickly, "-p", "no:cacheprovider", "-W", "ignore", str(tests)]))
+    return int(pytest.main(["-x", "-q", *quickly, "-p", "no:cacheprovider", "-W", "ignore", *tests]))
 
 
 def drawn(only: str, sample: int, seed: int) -> list[Mutant]:
@@ -141,7 +155,7 @@ def drawn(only: str, sample: int, seed: int) -> list[Mutant]:
     from grasp_ros.exact import __file__ as room
 
     found: list[Mutant] = []
-    for module in (*MODULES, *SEARCH) if sample else MODULES:
+    for module in (*MODULES, *SAMPLED) if sample or only else MODULES:
         source = Path(room).parent.joinpath(*module.split(".")).with_suffix(".py").read_text()
         own = [mutant for mutant in mutants(module, source, arithmetic if sample else branches)
                if only in f"{module}: {mutant.name}"]

@@ -11,6 +11,7 @@ from exact.bench import SIDES, bench
 from grasp_ros.exact.automaton.friction import (
     apply_friction,
     lift_friction,
+    noise_at,
     slide_in_contact,
     slide_in_flight,
     stays_stuck,
@@ -21,6 +22,7 @@ from grasp_ros.exact.contact.taylor_step import take_step
 from grasp_ros.exact.driver.workspace import new_workspace
 from grasp_ros.exact.numerics.polynomial import curvatures, values
 from grasp_ros.exact.records import Array, Plant, State, Tables
+from grasp_ros.exact.tolerances import FRICTION
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Of, Pair, Slide, V, Work, Z
 from grasp_ros.physics.model import Contact, impact_force
 
@@ -86,6 +88,22 @@ def test_what_is_free_at_rest_or_driven_does_not_stop_in_flight(
               slide=Slide.LEFTWARD if mirrored else slide)
     apply_friction(b.plant, b.state.mode)
     assert slide_in_flight(b.plant, b.state).when == math.inf
+
+
+@pytest.mark.parametrize("part", [0.0, 0.3, 1.0])
+def test_the_rounding_of_the_force_is_that_of_its_terms(part: float) -> None:
+    random = np.random.default_rng(6)
+    for _ in range(10):
+        tables, plant, state, n, h = stuck_step(random)
+        found = noise_at(tables, plant, state.mode, n, part * h)
+        values(tables.c, n, part * h, tables.at)
+        expected = abs(plant.given[OBJECT, Of.FORCE])
+        for side, v in ((LEFT, V.L), (RIGHT, V.R)):
+            if state.mode[side] == Pair.CONTACT:
+                hertzian, loss = plant.pairs[side]
+                speeds = abs(tables.at[v]) + abs(tables.at[V.O])
+                expected += 0.5 * hertzian * max(tables.at[Z.L + side], 0.0) ** 3 * (1.0 + loss * speeds)
+        assert found == pytest.approx(FRICTION * expected, rel=1e-13, abs=0.0)
 
 
 def stuck_step(random: np.random.Generator) -> tuple[Tables, Plant, State, int, float]:

@@ -193,6 +193,7 @@ def test_a_push_is_certain_since_it_exceeds_its_rounding_or_from_the_begin(
     tables = Tables(np.zeros(3 * LANES), empty, np.zeros(2 * LANES), empty, row)
     found = since_certain(tables, b.plant, b.state.mode, 2, 1.0)
     assert found.what is Slide.RIGHTWARD
+    assert found.when > 0.0
     assert found.when == pytest.approx(expected, rel=1e-13, abs=1e-30)
 
 
