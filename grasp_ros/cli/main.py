@@ -88,7 +88,8 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
         raise_on_signals()
         begin = time.monotonic()
         try:
-            options = parser().parse_args(words)
+            with needing("this"):
+                options = parser().parse_args(words)
         except FileNotFoundError:  # of an import
             _check_directory()
             raise

@@ -59,8 +59,16 @@ def need(what: str, *packages: str) -> None:
     from importlib.util import find_spec
 
     if missing := [name for name in packages if find_spec(name) is None]:
-        pip = " ".join("ros-jazzy-rclpy" if name == "rclpy" else name for name in missing)
-        raise Refused(f"{what} needs {', '.join(missing)}; pip install {pip}")
+        pip = dict.fromkeys(_distribution(name) for name in missing)
+        raise Refused(f"{what} needs {', '.join(missing)}; pip install {' '.join(pip)}")
+
+
+def _distribution(name: str) -> str:
+    """What brings a package."""
+    if name.endswith(("_msgs", "_srvs")):
+        return "ros-jazzy-common-interfaces"
+    ros = name == "rclpy" or name.endswith("_interfaces")
+    return "ros-jazzy-rclpy[fastrtps]" if ros else {"yaml": "PyYAML", "ruamel": "ruamel.yaml"}.get(name, name)
 
 
 @contextmanager

@@ -319,8 +319,13 @@ sys.exit({main}())
     (["mcap"], "cli.main:grasp", "inspect none", "grasp: this needs mcap; pip install mcap"),
     (["zstandard"], "cli.main:grasp", "verify none", "grasp: this needs zstandard; pip install zstandard"),
     (["rclpy", "rosbags"], "cli.main:grasp", "run case_01 -o x",
-     "grasp: this needs rclpy, rosbags; pip install ros-jazzy-rclpy rosbags"),
+     "grasp: this needs rclpy, rosbags; pip install ros-jazzy-rclpy[fastrtps] rosbags"),
+    (["yaml"], "cli.main:grasp", "simulate case_01", "grasp: this needs yaml; pip install PyYAML"),
     (["mcap"], "graph.__main__:start", "monitor", "monitor: this needs mcap; pip install mcap"),
+    (["std_srvs"], "graph.__main__:start", "plant",
+     "plant: this needs std_srvs; pip install ros-jazzy-common-interfaces"),
+    (["rcl_interfaces"], "graph.__main__:start", "plant",
+     "plant: this needs rcl_interfaces; pip install ros-jazzy-rclpy[fastrtps]"),
 ])
 def test_a_package_that_is_missing_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, missing: list[str], program: str, words: str, said: str
