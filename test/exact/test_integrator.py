@@ -151,6 +151,7 @@ def test_what_is_outside_is_refused(state: Any, options: dict[str, float], durat
 
 
 EVERYTHING = """
+import numba
 import numpy as np
 from grasp_ros import scene as scenes
 from grasp_ros.simulation import ensemble, simulate
@@ -163,7 +164,10 @@ nothing = ("stiffness_N_per_m", "damping_Ns_per_m", "position_gain_N_per_m", "ve
 free = {f"{section}.{key}": 0.0 for section, keys in scene.values.items() for key in keys if key in nothing}
 chain = simulate(scene.changed({**free, "right_arm.velocity_m_per_s": 0.0}), grid=np.linspace(0.0, 0.02, 5))
 print(*chain.state.ravel().tolist(), *(event.time for event in chain.events))
-own = {"controllers": {"left": lambda tick, time, x, v: -x}, "grid": None}
+@numba.cfunc("float64(int64, float64, float64, float64)")
+def pulls(tick, time, x, v):
+    return -2.0 * x
+own = {"controllers": {"left": lambda tick, time, x, v: -x, "right": pulls}, "grid": None}
 for settings in ({}, {"sampled": True}, own, {"method": "paper"}, {"method": "discrete_gradient"}):
     run = simulate(scene, **{"grid": np.linspace(0.0, 0.02, 5), **settings})
     print(*run.state.ravel().tolist(), *map(float, losses(run)))

@@ -22,7 +22,7 @@ from numba.core.types import float64, int64
 from numba.core.types.misc import Optional
 from numba.extending import is_jitted
 
-from grasp_ros.exact.compilation.jit import code_of_call, instruction
+from grasp_ros.exact.compilation.jit import COMPILED, code_of_call, instruction
 from grasp_ros.physics.control import Law, command_of
 from grasp_ros.physics.errors import Failed, Refused, described
 from grasp_ros.physics.observation import Observation, observables_of
@@ -96,7 +96,7 @@ class UserController:
         self._who, self._law = f"{side} controller {self.name}", law
         self._error: BaseException | None = None
         try:
-            function: Any = _compiled(law) if numba_law and not self.asks else None
+            function: Any = _compiled(law) if COMPILED and numba_law and not self.asks else None
         except NumbaError as error:
             lines = [line.strip() for line in COLOUR.sub("", str(error)).splitlines()]
             why = next((line for line in lines if line and not line.startswith(BESIDE)), type(error).__name__)

@@ -27,6 +27,7 @@ DEADLINE_SECONDS = 30.0
 STILL_SECONDS = 15.0  # without a tick and without a word: it hangs; `grasp run` itself waits 10 s for its nodes to end
 GO_ON_TICKS, GO_ON_SECONDS = WINDOW + 100, 4.0  # after the accident, when who was told to end has, and been missed
 LOOK_SECONDS = 0.1
+SUSPENDED = "this node was suspended"
 CLOSE_SECONDS = 15.0  # for the end after a Ctrl-C, or behind `grasp run`
 
 
@@ -137,7 +138,8 @@ def _close(stage: Stage, wait: bool) -> list[int]:
 def _read_words(evidence: Evidence, stage: Stage, begin: float, end: float) -> None:
     """What the user sees, and when the first sentence or report came.
 
-    The cause is in the last sentence of a run that ends, and in the first of one that goes on; effects follow.
+    The cause is in the last sentence of a run that ends, and in the first of one that goes on; effects follow. That a
+    node has lost time itself, as two faults run at a time, is the cause only where that is the fault.
     """
     news = stage.output.news(begin, end)
     concerns = stage.companion.ask("concerns")["concerns"]
@@ -147,7 +149,8 @@ def _read_words(evidence: Evidence, stage: Stage, begin: float, end: float) -> N
     evidence.noticed = min(times, default=math.nan) - begin
     words = [line.text for line in news]
     spoken = [text for text in words if SENTENCE.match(text)] or words or [text for _, text in reports] or [""]
-    evidence.said = plain(spoken[0 if evidence.went_on else -1], [stage.place])
+    causes = [text for text in spoken if SUSPENDED not in text or evidence.culprit == SUSPENDED] or spoken
+    evidence.said = plain(causes[0] if evidence.went_on else spoken[-1], [stage.place])
     evidence.traceback = plain(stage.output.traceback, [stage.place])
 
 

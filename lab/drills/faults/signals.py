@@ -10,7 +10,7 @@ from functools import partial
 from signal import Signals
 
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV
-from lab.drills.faults.drill import Drill, node
+from lab.drills.faults.drill import SUSPENDED, Drill, node
 from lab.drills.faults.stage import NODES, Stage
 
 FROZEN_SECONDS = 5.0
@@ -20,7 +20,7 @@ SIGNALS = ("SIGKILL", "SIGSTOP", "SIGHUP", "SIGQUIT", "SIGTERM", "SIGINT")
 ALONE_SIGNALS = ("SIGKILL", "SIGTERM")
 ASKING = ("SIGHUP", "SIGQUIT", "SIGTERM", "SIGINT")  # the graph to end
 UNDER, ALONE, PATIENT = "under `grasp run`", "in four terminals, with `on_silence:=end`", "in four terminals"
-PARENT, SUSPENDED = "parent process", "this node was suspended"  # in what nodes say of it, and of themselves
+PARENT = "parent process"  # in what nodes say of it
 QUICK = ("SIGKILL-monitor", "SIGKILL-grasp")
 
 
