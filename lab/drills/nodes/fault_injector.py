@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.duration import Duration
 from rclpy.experimental import EventsExecutor
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
@@ -119,6 +120,7 @@ class FaultInjector:
             publisher.publish(message)
             sent += 1
             self.spin() if sent % 100 == 0 else None
+        self._wait(lambda: publisher.wait_for_all_acked(Duration(seconds=0)))  # a reader may know this source later
         self._wait(lambda: False, KEEP_SECONDS)
         self._node.destroy_publisher(publisher)
         return {"begin": begin, "sent": sent}
