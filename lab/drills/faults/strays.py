@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from grasp_ros.graph.ros.node import NEW
 from grasp_ros.scene.topics import (
     ALIVE,
     CHANGES,
@@ -28,7 +27,7 @@ from lab.drills.nodes import NAME
 STRAY, ROGUE, OTHERS = "a stray message", "a controller that answers wrongly", "others in the same domain"
 CODE = "!!python/object/apply:os.mkdir ['owned']"
 NAMES_SECONDS = 2.0  # for discovery to tell the names of nodes that have just come
-INJECTOR = f"/{NAME}|{NEW}"  # as long as discovery has no name for it
+INJECTOR = f"/{NAME}|a node whose name is not known yet"  # the latter as long as discovery has none
 MALFORMED: dict[str, Any] = {"name": ["left", "object"], "position": [0.1], "velocity": [], "effort": [1.0, 2.0, 3.0]}
 
 
