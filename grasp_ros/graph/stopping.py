@@ -21,7 +21,7 @@ from typing import Any
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 GRACE_SECONDS = 10.0  # to end cleanly after a signal, or after the process that started this one has ended
-AGAIN_SECONDS = 0.001
+AGAIN_SECONDS = 0.001  # until an interrupt that was dropped comes again
 MOST_WORDS = 4000  # characters
 PR_SET_PDEATHSIG = 1  # of prctl(2)
 _raised: list[int] = []  # signals that `raise_on_signals` has turned into an exception

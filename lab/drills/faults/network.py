@@ -12,8 +12,8 @@ import time
 from functools import partial
 
 from grasp_ros.graph.host import LOCALHOST, RANGE, SUBNET
-from grasp_ros.physics.errors import Failed
 from grasp_ros.scene.topics import JOINT_STATES
+from lab.drills.faults.companion import Failed
 from lab.drills.faults.drill import Drill, Skipped
 from lab.drills.faults.stage import START_SECONDS, Stage
 from lab.drills.faults.verdict import Evidence
