@@ -75,17 +75,19 @@ def _paper(options: Options) -> int:
 
 
 def _fuzz(options: Options) -> int:
+    from lab.cases import degenerate
     from lab.drills import fuzz, random_scenes
     from lab.studies import pages
 
     seconds = _seconds(options.seconds, options.draws)
+    ordinary = degenerate.ORDINARY if options.ordinary is None else options.ordinary
     pages.claim(options.output / "scene.yaml")
     prepare()
-    memory = None if options.docs is None else random_scenes.Kept(options.output, options.seed)
+    memory = None if options.docs is None else random_scenes.Kept(options.output, options.seed, ordinary)
     book = fuzz.run(options.seed, options.output, seconds=seconds, draws=options.draws, first=options.first,
-                    jobs=options.jobs, memory=memory)
+                    jobs=options.jobs, memory=memory, ordinary=ordinary)
     if options.docs is not None:
-        random_scenes.write_page(options.docs, options.seed, options.first, book)
+        random_scenes.write_page(options.docs, options.seed, options.first, book, ordinary)
     return 1 if book.broken else 0
 
 
@@ -181,6 +183,8 @@ COMMANDS = (
     Command("fuzz", "random scenes against all properties", _fuzz, (
         _asked("--seconds", type=float, help=SECONDS.format("--draws")),
         _asked("--draws", type=whole(1), help="how many scenes"), FIRST, SEED,
+        _asked("--ordinary", type=float, metavar="PART",
+               help="probability of a scene that is not degenerate (default: most are)"),
         _asked("--jobs", type=whole(1), default=1, help="processes (default 1)"),
         _output("DIRECTORY", "for scenes that fail; with --docs what is known there is not drawn again",
                 Path("runs") / "fuzz"),

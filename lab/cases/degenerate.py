@@ -84,9 +84,9 @@ DEGENERACIES: tuple[tuple[str, float, Callable[[Sketch], None]], ...] = (
 )
 
 
-def draw_scene(draw: Draw) -> Scene:
-    """A scene, ordinary or degenerate."""
-    return draw_ordinary(draw) if draw.chance(ORDINARY) else draw_degenerate(draw)
+def draw_scene(draw: Draw, ordinary: float = ORDINARY) -> Scene:
+    """A scene, with this probability an ordinary one, else a degenerate one."""
+    return draw_ordinary(draw) if draw.chance(ordinary) else draw_degenerate(draw)
 
 
 def draw_degenerate(draw: Draw) -> Scene:

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,7 +21,7 @@ from tqdm import tqdm
 
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
-from lab.cases.degenerate import draw_scene
+from lab.cases.degenerate import ORDINARY, draw_scene
 from lab.cases.draw import inside
 from lab.oracles.properties import Check, Examination, examine
 
@@ -101,16 +102,16 @@ def _ordered(counts: Counter[str]) -> list[tuple[str, int]]:
     return sorted(counts.items(), key=lambda item: (-item[1], item[0]))
 
 
-def draw(seed: int, number: int) -> Scene:
-    """The scene of a seed and a number."""
-    return inside(draw_scene, np.random.default_rng((seed, number)))
+def draw(seed: int, number: int, ordinary: float = ORDINARY) -> Scene:
+    """The scene of a seed and a number; `ordinary` is the part of scenes that are not degenerate."""
+    return inside(partial(draw_scene, ordinary=ordinary), np.random.default_rng((seed, number)))
 
 
-def check_draws(seed: int, numbers: Iterable[int]) -> Book:
+def check_draws(seed: int, numbers: Iterable[int], ordinary: float = ORDINARY) -> Book:
     """Draw scenes and check them; an exception is a failure."""
     book = Book()
     for number in numbers:
-        book.merge(_check(number, draw(seed, number)))
+        book.merge(_check(number, draw(seed, number, ordinary)))
     return book
 
 
@@ -133,7 +134,7 @@ def _check(number: int, scene: Scene) -> Book:
 
 
 def run(seed: int, directory: Path, *, seconds: float | None = None, draws: int | None = None, first: int = 0,
-        jobs: int = 1, memory: Kept | None = None) -> Book:
+        jobs: int = 1, memory: Kept | None = None, ordinary: float = ORDINARY) -> Book:
     """Draw scenes until the time is over or enough are drawn; print what became of them, write those that fail.
 
     Parameters
@@ -149,6 +150,8 @@ def run(seed: int, directory: Path, *, seconds: float | None = None, draws: int 
         Processes.
     memory : Kept, optional
         What it knows is not drawn again.
+    ordinary : float
+        Part of ordinary scenes among the draws.
 
     Raises
     ------
@@ -157,7 +160,7 @@ def run(seed: int, directory: Path, *, seconds: float | None = None, draws: int 
     """
     begin, book = time.monotonic(), Book()
     with tqdm(total=draws, unit=" draws", desc="fuzz", file=sys.stderr) as bar:
-        for chunk in _chunks(seed, draws, first, jobs, memory):
+        for chunk in _chunks(seed, draws, first, jobs, memory, ordinary):
             book.merge(chunk)
             for number, yaml in chunk.scenes.items():
                 _write(directory, seed, number, yaml, bar)
@@ -169,7 +172,8 @@ def run(seed: int, directory: Path, *, seconds: float | None = None, draws: int 
     return book
 
 
-def _chunks(seed: int, draws: int | None, first: int, jobs: int, memory: Kept | None) -> Iterator[Book]:
+def _chunks(seed: int, draws: int | None, first: int, jobs: int, memory: Kept | None,
+            ordinary: float) -> Iterator[Book]:
     """The books of all chunks in their order; what is new is kept in `memory`."""
     starts = count(first, CHUNK) if draws is None else range(first, first + draws, CHUNK)
     end = None if draws is None else first + draws
@@ -179,7 +183,7 @@ def _chunks(seed: int, draws: int | None, first: int, jobs: int, memory: Kept | 
         asked, answer = waiting.pop(0)
         if isinstance(answer, Book):
             return answer
-        book: Book = check_draws(seed, asked) if answer is None else answer.get()
+        book: Book = check_draws(seed, asked, ordinary) if answer is None else answer.get()
         if memory is not None:
             memory.put(asked, book)
         return book
@@ -189,7 +193,7 @@ def _chunks(seed: int, draws: int | None, first: int, jobs: int, memory: Kept | 
             numbers = range(start, start + CHUNK if end is None else min(start + CHUNK, end))
             found: Any = None if memory is None else memory.get(numbers)
             if found is None and pool is not None:
-                found = pool.apply_async(check_draws, (seed, numbers))
+                found = pool.apply_async(check_draws, (seed, numbers, ordinary))
             waiting.append((numbers, found))
             if pool is None or len(waiting) > 2 * jobs:
                 yield take()

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from grasp_ros.exact.compilation.kernel_cache import sources_digest
 from grasp_ros.scene.versions import versions
+from lab.cases.degenerate import ORDINARY
 from lab.drills.fuzz import Book, Tally
 from lab.studies import pages
 from lab.studies.records import Journal, digest
@@ -32,10 +33,10 @@ class Kept:
         If the journal cannot be read or written, or is damaged.
     """
 
-    def __init__(self, directory: Path, seed: int) -> None:
+    def __init__(self, directory: Path, seed: int, ordinary: float = ORDINARY) -> None:
         sources = (path.read_text("utf-8") for room in ROOMS for path in sorted((pages.HOME / room).rglob("*.py")))
         self._journal = Journal(directory)
-        self._name = digest(seed, sources_digest(), *sources, *versions().items())
+        self._name = digest(seed, ordinary, sources_digest(), *sources, *versions().items())
 
     def _key(self, numbers: range) -> str:
         return f"{self._name} {numbers.start} {numbers.stop}"
@@ -54,7 +55,7 @@ class Kept:
         self._journal.put(self._key(numbers), Line(json.dumps(vars(book), default=vars)))
 
 
-def write_page(docs: Path, seed: int, first: int, book: Book) -> None:
+def write_page(docs: Path, seed: int, first: int, book: Book, ordinary: float = ORDINARY) -> None:
     """Write what was counted.
 
     Raises
@@ -62,6 +63,7 @@ def write_page(docs: Path, seed: int, first: int, book: Book) -> None:
     Refused
         If it cannot be written.
     """
-    failures = [[f"`--seed {seed} --first {number} --draws 1`", yaml.splitlines()[0].split(": ", 1)[1]]
+    source = f"--seed {seed}" + ("" if ordinary == ORDINARY else f" --ordinary {ordinary:g}")
+    failures = [[f"`{source} --first {number} --draws 1`", yaml.splitlines()[0].split(": ", 1)[1]]
                 for number, yaml in sorted(book.scenes.items())]
-    pages.write(docs, "fuzz", seed=seed, first=first, draws=book.ends.total(), failures=failures, **book.tables())
+    pages.write(docs, "fuzz", source=source, first=first, draws=book.ends.total(), failures=failures, **book.tables())

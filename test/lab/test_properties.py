@@ -162,7 +162,7 @@ def test_fuzzing_counts_failures_and_writes_their_scenes(
 ) -> None:
     """The same scene over and over, first as it is, then at the coarsest accuracy."""
     scene = scenes.load("case_03", ["time.duration_s=5", "time.control_period_s=5"])
-    monkeypatch.setattr(fuzz, "draw_scene", lambda draw: scene)
+    monkeypatch.setattr(fuzz, "draw_scene", lambda draw, ordinary: scene)
     assert fuzz.run(0, tmp_path, draws=3).broken == 0
     monkeypatch.setattr(properties, "Product", partial(Product, accuracy=1e-3))
     failures = fuzz.run(0, tmp_path, draws=3).broken
