@@ -20,7 +20,8 @@ from grasp_ros.physics import control
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Answer, Of, Outcome, Place, V
 
 FIRST = whole(0)  # interval
-measured, feedback, limited = kernel(control.measured), kernel(control.feedback), kernel(control.limited)
+is_due, measured = kernel(control.is_due), kernel(control.measured)
+feedback, limited = kernel(control.feedback), kernel(control.limited)
 
 
 @inlined
@@ -33,6 +34,9 @@ def answer(state: State, loop: Loop, k: int) -> bool:
         callee, row = loop.callee[side], loop.laws[side]
         if callee == Answer.GIVEN:
             continue
+        if not is_due(row, loop.place[Place.TICK] + k):
+            loop.answers[k, side] = loop.held[side]
+            continue
         x, v, _ = arm_of(state.y, side)
         x, v = measured(row, loop.normals[side, min(k, loop.normals.shape[1] - 1)], x, v)
         if callee == Answer.LAW:
@@ -42,7 +46,7 @@ def answer(state: State, loop: Loop, k: int) -> bool:
             if not math.isfinite(force):
                 loop.place[Place.FAILED] = side
                 return False
-        loop.answers[k, side] = limited(row, force)
+        loop.held[side] = loop.answers[k, side] = limited(row, force)
     return True
 
 

@@ -90,11 +90,12 @@ class Parameter(NamedTuple):
     def holds(self, values: Any) -> Any:
         """Whether a number, or each of some in an array, is in the range; NaN is in none."""
         within = (self.low < values if self.open_low else self.low <= values) & (values <= self.high)
+        if self.whole:  # 7.0 is whole: messages carry nothing else
+            within = within & (values % 1 == 0)
         return within & ((values == 0.0) | (abs(values) >= self.smallest)) if self.has_smallest else within
 
     def _accepts_one(self, value: int | float | None) -> bool:
-        # 7.0 is whole: messages carry nothing else
-        return value is not None and not (self.whole and value != value // 1) and bool(self.holds(value))
+        return value is not None and bool(self.holds(value))
 
 
 class Output(NamedTuple):
