@@ -26,6 +26,9 @@ from grasp_ros.simulation import GRID_POINTS
 from lab.cases.registry import cases
 from lab.drills.faults import run as faults
 from lab.paper import page as paper
+from lab.paper.cases import FIGURES
+from lab.paper.equation_table import EQUATIONS
+from lab.paper.statements import STATEMENTS
 from lab.studies import accuracy, certificate, derivatives, domain, effects, hard, pages
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -143,3 +146,18 @@ def test_the_regression_scenes_are_counted() -> None:
 
 def test_the_faults_are_those_of_the_code() -> None:
     assert [row["fault"] for row in table("faults")] == [drill.fault for drill in faults.all_drills()]
+
+
+def test_the_statements_of_the_paper_are_those_of_the_code() -> None:
+    rows = {section: [row for row in table("paper") if row["section"] == section] for section in (
+        "statements", "checks", "equations")}
+    parts = {f"{each.key}.{number}": part for each in STATEMENTS.values() for number, part in enumerate(each.parts, 1)}
+    found = {row["number"]: row["statement"] for row in rows["statements"]}
+    assert list(found) == list(parts)
+    expected = {number: getattr(part, "statement", found[number]) for number, part in parts.items()}
+    assert found == expected
+    assert {found[row["number"]] for row in rows["checks"]} == {*found.values()}
+    assert [row["number"] for row in rows["equations"]] == [name.split()[0] for name in EQUATIONS]
+    assert [row[1] for row in cells("paper", "figure")] == [figure.caption for figure in FIGURES]
+    lines = re.findall(r"^\| ([PCT]\d+) \| (.*?) \| \*\*", page("paper"), re.M)
+    assert lines == [(each.key, each.statement) for each in STATEMENTS.values()]
