@@ -45,7 +45,7 @@ def reference(directory: Path) -> str:
         scene = scenes.load(name)
         scene = scene.changed({"time.duration_s": SECONDS.get(name, scene.duration)})
         times = [part * scene.duration for part in PARTS]
-        entry = f"derivative {scene_key(scene)} {key} {times!r}"
+        entry = f"extrapolated derivative {scene_key(scene)} {key} {times!r}"
         known = journal.kept(entry, Known, partial(_known, scene, key, times))
         rows += _rows(scene, key, np.array(times), np.array(known.state))
     heads = ("scene", "number", "t, s", "largest derivative", "relative error", "one rounding changes it by")
