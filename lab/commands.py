@@ -195,7 +195,8 @@ COMMANDS = (
             " scenes, and peers", _derivatives, (
                 _asked("--table", dest="tables", action="append", choices=("reference", "random", "peers", "cost"),
                        help="one of the page's tables; repeatable (default all but peers)"),
-                _asked("--draws", type=whole(1), default=300, metavar="N", help="random scenes (default 300)"),
+                _asked("--draws", type=whole(1), default=300, metavar="N",
+                       help="draw random scenes until N agree or are wrong (default 300)"),
                 JOURNAL,
             ), "derivatives"),
     Command("effects", "what each effect costs: counts of work, times, bytes",

@@ -28,16 +28,17 @@ FACTOR = 8.0  # by which a difference may be less certain than its neighbours sh
 SMALLEST = 1e-9  # of the derivative, likewise
 BEND = 0.1  # of the derivative: where one-sided differences disagree by more, steps are too long
 MOST_WORK = 20_000  # of a run
-AGREES, FLAGGED, REFUSED, UNDECIDED, LONG, WRONG = VERDICTS = (
-    "agrees", "flagged", "refused", "not decidable", "too long", "wrong")
+AGREES, WRONG = DECIDED = "agrees", "wrong"
+FLAGGED, REFUSED, UNDECIDED, LONG = "flagged", "refused", "not decidable", "too long"
 
 
 class Verdict(NamedTuple):
     """What became of one comparison."""
 
-    word: str  # one of VERDICTS
+    word: str  # one of DECIDED, or why nothing is
     error: float = 0.0  # the largest, in what is allowed
-    text: str = ""  # why it is refused, or what is wrong
+    text: str = ""  # what was compared
+    reason: str = ""  # why it is refused or flagged
 
 
 def smooth_keys(scene: Scene) -> list[tuple[str, float]]:
@@ -75,9 +76,9 @@ def judge(scene: Scene, key: str, size: float) -> Verdict:
         rates = found.state_rates[-1, :, 0]
         spread = _spread(scene, key, rates)
     except Refused as refusal:
-        return Verdict(REFUSED, text=str(refusal))
+        return Verdict(REFUSED, reason=str(refusal).removeprefix(f"{scene.name}: ").partition(";")[0])
     if found.corner is not None:
-        return Verdict(FLAGGED)
+        return Verdict(FLAGGED, reason=found.corner_reason or "")
     there = np.isfinite(found.state[-1])
     if not np.isfinite(rates[there]).all():
         return Verdict(WRONG, np.inf, f"{rates}")

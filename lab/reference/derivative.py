@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -12,11 +12,11 @@ import numpy as np
 
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from lab.reference.plant import SIDES
-from lab.reference.solve import Reference, integrate
+from lab.reference.plant import Real, Reals
+from lab.reference.solve import integrate
 
-STEP = 2.0**-44  # of a number near 1: so small that no derivative changes over it; sums in a scene stay exact
-DIGITS = 30
+STEP = 2.0**-50  # of a number, whose neighbours are 2^-53 to 2^-52 of it apart
+DIGITS = 25
 
 
 class Derivative(NamedTuple):
@@ -31,21 +31,39 @@ class Derivative(NamedTuple):
 
 
 def difference(scene: Scene, key: str, times: Sequence[float]) -> Derivative:
-    """A central difference, or a one-sided one of a number at 0 that cannot be negative."""
+    """Central differences, or one-sided ones of a number at 0 that cannot be negative, extrapolated to a step of 0.
+
+    Those of two steps are, one of them twice the other (L. F. Richardson, Phil. Trans. R. Soc. A 210 (1911) 307): where
+    a motion grows by 1e11, even the smallest step of a float is too long for one difference.
+    """
     section, _, name = key.partition(".")
     value = scene.values[section][name]
-    step = STEP * max(1.0, 2.0 ** round(math.log2(abs(value) or 1.0)))
-    signed = "position" in name or "velocity_m" in name or "set_point" in name
-    low, high = value - step if value >= step or signed else value, value + step
-    first, second = (integrate(scene.changed({key: at}), times, DIGITS) for at in (low, high))
+    step = STEP * 2.0 ** round(math.log2(abs(value) or 1.0))
+    central = value != 0.0 or "position" in name or "velocity_m" in name or "set_point" in name
     with gmpy2.context(precision=4 * DIGITS):
-        width = gmpy2.mpq(Fraction(high) - Fraction(low))
-        state = [[float((b - a) / width) for a, b in zip(*rows, strict=True)]
-                 for rows in zip(first.state, second.state, strict=True)]
-        return Derivative(np.array(state), _times(first, second, width, 2), _times(first, second, width, 3))
+        near, far = (_slopes(scene, key, times, value - width if central else value, value + width)
+                     for width in (step, 2.0 * step))
+        order = 2 if central else 1  # of the error in the step
+        *state, left, right, later_left, later_right = _pairwise(lambda a, b: a + (a - b) / (2**order - 1), near, far)
+    return Derivative(np.array(state, dtype=float), _floats(left, right), _floats(later_left, later_right))
 
 
-def _times(first: Reference, second: Reference, width: float, place: int) -> tuple[list[float], list[float]]:
-    left, right = ([float((b - a) / width) for a, b in zip(first[place][side], second[place][side], strict=True)]
-                   if len(first[place][side]) == len(second[place][side]) else [] for side in SIDES)
-    return left, right
+def _slopes(scene: Scene, key: str, times: Sequence[float], low: float, high: float) -> list[Reals]:
+    """Differences of states, one after another, and of the times of touches and releases, left and right."""
+    first, second = (
+        (*run.state, *run.touches, *run.releases)
+        for run in (integrate(scene.changed({key: at}), times, DIGITS) for at in (low, high)))
+    width = gmpy2.mpq(Fraction(high) - Fraction(low))
+    return _pairwise(lambda a, b: (b - a) / width, first, second)
+
+
+def _pairwise(
+    combine: Callable[[Real, Real], Real], first: Iterable[Sequence[Real]], second: Iterable[Sequence[Real]],
+) -> list[Reals]:
+    """Combine the numbers of two sequences of lists; those of unequal lengths make an empty one."""
+    return [[combine(a, b) for a, b in zip(*pair, strict=True)] if len(pair[0]) == len(pair[1]) else []
+            for pair in zip(first, second, strict=True)]
+
+
+def _floats(left: Reals, right: Reals) -> tuple[list[float], list[float]]:
+    return [float(value) for value in left], [float(value) for value in right]

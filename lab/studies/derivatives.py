@@ -14,7 +14,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.differentiate import differentiate
-from lab.oracles.differences import VERDICTS, WRONG, judge_draw
+from lab.oracles.differences import DECIDED, WRONG, judge_draw
 from lab.reference.derivative import difference
 from lab.studies import derivative_cost, pages, peer_derivatives
 from lab.studies.records import Journal, scene_key
@@ -45,7 +45,7 @@ def reference(directory: Path) -> str:
         scene = scenes.load(name)
         scene = scene.changed({"time.duration_s": SECONDS.get(name, scene.duration)})
         times = [part * scene.duration for part in PARTS]
-        entry = f"derivative {scene_key(scene)} {key} {times!r}"
+        entry = f"extrapolated derivative {scene_key(scene)} {key} {times!r}"
         known = journal.kept(entry, Known, partial(_known, scene, key, times))
         rows += _rows(scene, key, np.array(times), np.array(known.state))
     heads = ("scene", "number", "t, s", "largest derivative", "relative error", "one rounding changes it by")
@@ -78,21 +78,25 @@ def _off(scene: Scene, signs: Array) -> Scene:
     return scene.changed({f"{body}.position_m": scene.values[body]["position_m"] + way for body, way in places})
 
 
-def random_scenes(draws: int) -> str:
-    """What became of random scenes, as a table of Markdown; scenes whose derivatives are wrong are printed."""
+def random_scenes(decided: int) -> str:
+    """Draw scenes until so many are decided: what became of all, as a table of Markdown; wrong ones are printed."""
     counts: Counter[str] = Counter()
-    for number in range(draws):
+    number = 0
+    while sum(counts[word] for word in DECIDED) < decided:
         drawn, verdict = judge_draw(number)
-        counts[verdict.word] += 1
+        number += 1
+        counts[f"{verdict.word}: {verdict.reason}" if verdict.reason else verdict.word] += 1
         if verdict.word == WRONG:
             print(f"{verdict.text}\n{drawn}")
-    return pages.table(("drawn", *VERDICTS), [[str(draws), *(str(counts[word]) for word in VERDICTS)]])
+    heads = [*DECIDED, *sorted(counts.keys() - {*DECIDED}, key=lambda head: (-counts[head], head)), "drawn"]
+    counts["drawn"] = number
+    return pages.table(("result", "scenes"), [[head, str(counts[head])] for head in heads])
 
 
-def tables(names: list[str], directory: Path, draws: int) -> dict[str, str]:
+def tables(names: list[str], directory: Path, decided: int) -> dict[str, str]:
     """The named tables of the page, measured now."""
     measures = {
-        REFERENCE: lambda: reference(directory), RANDOM: lambda: random_scenes(draws),
+        REFERENCE: lambda: reference(directory), RANDOM: lambda: random_scenes(decided),
         PEERS: lambda: peer_derivatives.report(peer_derivatives.run()), COST: derivative_cost.run,
     }
     return {name: measures[name]() for name in names}

@@ -1,4 +1,4 @@
-"""Derivatives of natural random scenes beside differences of runs; `python -m lab derivatives --draws N` does more."""
+"""Derivatives of random scenes beside differences of runs; `python -m lab derivatives --table random` judges more."""
 
 from __future__ import annotations
 
