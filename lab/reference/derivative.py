@@ -16,6 +16,7 @@ from lab.reference.plant import Real, Reals
 from lab.reference.solve import integrate
 
 STEP = 2.0**-50  # of a number, whose neighbours are 2^-53 to 2^-52 of it apart
+FROM_ZERO = 2.0**-60  # the step of a number that is 0, whose neighbours are as near as one likes
 DIGITS = 25
 
 
@@ -38,7 +39,7 @@ def difference(scene: Scene, key: str, times: Sequence[float]) -> Derivative:
     """
     section, _, name = key.partition(".")
     value = scene.values[section][name]
-    step = STEP * 2.0 ** round(math.log2(abs(value) or 1.0))
+    step = STEP * 2.0 ** round(math.log2(abs(value))) if value else FROM_ZERO
     central = value != 0.0 or "position" in name or "velocity_m" in name or "set_point" in name
     with gmpy2.context(precision=4 * DIGITS):
         near, far = (_slopes(scene, key, times, value - width if central else value, value + width)
