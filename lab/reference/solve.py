@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from grasp_ros.physics.control import is_due
 from grasp_ros.scene import Scene
+from grasp_ros.scene.effects.base import NANOSECONDS
 from lab.reference.automaton import Event
 from lab.reference.plant import LEFT, OBJECT, RIGHT, Body, Law, Plant, Real, Reals, number
 from lab.reference.run import EXPONENTS, Row, Run, Spent, precision
@@ -97,7 +98,9 @@ def integrate(scene: Scene, times: Iterable[Real], digits: int = 25, budget: flo
                     waiting.append(commands)
                     forces = [a + b for a, b in zip(forces, waiting.pop(0), strict=True)]
                 run.enter(_pushed(plant, forces))
-                run.advance(min(exact(float(scene.time_of(following))), grid[-1]))
+                # a tick is a whole number of nanoseconds: as a float 5.02 s is 4e-16 s less
+                run.advance(grid[-1] if following == scene.ticks
+                            else min(mpfr(following * scene.period_ns) / NANOSECONDS, grid[-1]))
                 if len(run.rows) == len(grid):
                     break
         except Spent:

@@ -105,6 +105,14 @@ class Output(NamedTuple):
     value: Callable[[System, int, Array], float]  # system, tick, state (6,) to N
 
 
+class Relation(NamedTuple):
+    """What numbers of a scene must obey together, each of which is in its range."""
+
+    text: str  # for the page of the domain
+    why: str
+    problems: Callable[[Sections], Iterable[str]]  # how a scene breaks it, see `problem`
+
+
 def problem(key: str, value: object, allowed: str) -> str:
     """Why numbers that are each in their range do not go together."""
     return f"{key}: {value!r} is not allowed; allowed: {allowed}"
@@ -134,7 +142,7 @@ class Effect:
     node: str = "plant"  # the executable that declares its parameters
     commands: Topic | None = None  # topic of the controller that it brings
     outputs: tuple[Output, ...] = ()  # what the plant publishes about it
-    problems: Callable[[Sections], Iterable[str]] = nothing  # what is wrong beyond ranges
+    relations: tuple[Relation, ...] = ()  # what its numbers must obey beyond their ranges
     oddities: Callable[[Sections, System], Iterable[str]] = nothing  # suspicious settings
     acts_by: tuple[str, ...] = ()  # keys of numbers without which, or where all are 0, it does nothing
     example: Numbers = field(default_factory=dict)  # keys to add to a scene to see what it does; none: the paper has it

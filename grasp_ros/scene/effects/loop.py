@@ -9,7 +9,7 @@ from grasp_ros.physics.control import Column
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.sampled import spectral_radius
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import NANOSECONDS, SIDES, Effect, Parameter, Sections, oddity, problem
+from grasp_ros.scene.effects.base import NANOSECONDS, SIDES, Effect, Parameter, Relation, Sections, oddity, problem
 from grasp_ros.scene.effects.time import nanoseconds, period_ns
 
 HELD = "commands are held over control periods and do work of their own"
@@ -24,10 +24,14 @@ def _delay(sections: Sections) -> int:
     return numbers.get("delay_ticks") or nanoseconds(numbers.get("delay_s", 0.0)) // period_ns(sections)
 
 
-def _problems(sections: Sections) -> Iterable[str]:
-    seconds, ticks = (sections["loop"].get(key, 0) for key in ("delay_s", "delay_ticks"))
-    if seconds and ticks:
-        yield problem("loop.delay_s", seconds, "one of delay_s and delay_ticks")
+def _both(sections: Sections) -> Iterable[str]:
+    numbers = sections["loop"]
+    if numbers.get("delay_s") and numbers.get("delay_ticks"):
+        yield problem("loop.delay_s", numbers["delay_s"], "one of delay_s and delay_ticks")
+
+
+def _off_tick(sections: Sections) -> Iterable[str]:
+    seconds = sections["loop"].get("delay_s", 0.0)
     whole = nanoseconds(seconds) / NANOSECONDS == seconds and nanoseconds(seconds) % period_ns(sections) == 0
     if not whole or _delay(sections) > LONGEST:
         period = sections["time"]["control_period_s"]
@@ -90,6 +94,11 @@ EFFECTS = (
                       "the same in seconds, a whole number of control periods, in place of delay_ticks", optional=True),
         ),
         _build, "V_c may rise by the work of the held commands; the energy balance with that work is exact",
-        example={"delay_ticks": 2}, problems=_problems, oddities=_odd,
+        example={"delay_ticks": 2}, oddities=_odd,
+        relations=(
+            Relation("only one of `delay_ticks` and `delay_s` is there, or not 0", "both are the same delay", _both),
+            Relation(f"`delay_s` is a whole number of control periods, at most {LONGEST}",
+                     "commands arrive at ticks only", _off_tick),
+        ),
     ),
 )
