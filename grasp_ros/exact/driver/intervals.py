@@ -91,11 +91,11 @@ def enter_interval(plant: Plant, state: State, loop: Loop, out: Output, grid: Ar
 
 @inlined
 def rest(state: State, loop: Loop) -> None:
-    """Skip what is left of an interval at rest; with controllers no time of rest is kept: they may move it."""
+    """Skip what is left of an interval at rest, and keep the time since when nothing moves."""
     put(state, V.L, 0.0)
     put(state, V.O, 0.0)
     put(state, V.R, 0.0)
-    if loop.answers.shape[0] == 0 and state.rest[SINCE] == math.inf:
+    if state.rest[SINCE] == math.inf:
         state.rest[SINCE] = (state.clock[0] + state.clock[1]) + state.clock[2]
     state.clock[0], state.clock[1] = loop.lengths[loop.place[Place.INTERVAL]], 0.0
 
