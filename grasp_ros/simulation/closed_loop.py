@@ -17,7 +17,7 @@ from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Loop, new_place, one_interval
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.registry import METHODS
-from grasp_ros.physics.control import FIXED, ControlLaw, Law
+from grasp_ros.physics.control import FIXED, Column, ControlLaw, Law
 from grasp_ros.physics.domain import LARGEST_POSITION, LARGEST_SPEED
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import mapping, names, plain
@@ -162,11 +162,12 @@ def drive(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -> A
 def _repeats(scene: Scene, since: float, changes: Changes) -> bool:
     """Whether the controllers of a scene that is at rest since a time in s answer the same for good.
 
-    Without noise they do if the command that answers this state, by their last numbers, has arrived and moved nothing.
+    Without noise they do if the commands that answer this state, by their last numbers, have arrived and moved nothing.
     """
     quiet = all(law.seed is None for law in scene.system.laws.values())
+    slowest = int(scene.system.law_rows[:, Column.PERIOD].max())
     answered = max(since, scene.time_of(max(changes, default=0)))
-    return quiet and bool(answered <= scene.time_of(scene.ticks - 1 - scene.system.delay))
+    return quiet and bool(answered <= scene.time_of(scene.ticks - slowest - scene.system.delay))
 
 
 def solve(

@@ -89,6 +89,7 @@ def test_held_commands_that_may_change_do_not_rest() -> None:
     change = {"left_feedback.set_point_m": 0.03}
     assert simulate(late).at_rest is not None
     assert simulate(late, changes={9996: change}).at_rest is None  # it arrives after the end
+    assert simulate(horizon("preload", 10.0, "loop={}", "left_rate.period_ticks=9000")).at_rest is None
     for key, rests in (("position_noise_m=1e-30", False), ("position_step_m=1e-6", True)):
         measured = horizon("preload", 10.0, "loop={}", "left_sensor.noise_seed=1", f"left_sensor.{key}")
         assert (simulate(measured).at_rest is not None) == rests
