@@ -9,7 +9,7 @@ export ROS_DOMAIN_ID ?= 42
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
 # Studies that write a page, those first that take longest; and further arguments of one of them.
-PAGES := derivatives accuracy maps fuzz hard paper faults effects certificate domain
+PAGES := derivatives accuracy maps fuzz hard paper faults effects digits certificate domain
 fuzz_options := --seed 20261130 --draws 60000 --jobs 2
 
 .PHONY: demo test thorough quick lint install docs study laboratory benchmark mutants lowest clean

@@ -180,6 +180,8 @@ COMMANDS = (
     Command("hard", "hard cases: the error reached, and what others reach", _study("hard", "docs", "alone"), (
         _asked("--alone", action="store_true", help="without other solvers, which takes a minute instead of ten"),
     ), "hard"),
+    Command("digits", "all scenes of the package beside 25 digits, and what one rounding becomes",
+            _study("digits", "docs"), page="digits"),
     Command("fuzz", "random scenes against all properties", _fuzz, (
         _asked("--seconds", type=float, help=SECONDS.format("--draws")),
         _asked("--draws", type=whole(1), help="how many scenes"), FIRST, SEED,

@@ -6,8 +6,9 @@ import math
 
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.impact import damping_factor
-from grasp_ros.exact.numerics.roots import LARGE, SMALL, safe_step
+from grasp_ros.exact.numerics.roots import safe_step
 from grasp_ros.exact.records import Array, Motion, PairFlight, Plant, Rates
+from grasp_ros.exact.tolerances import DIED_OUT
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, U, V, X
 
 
@@ -85,7 +86,7 @@ def bound_by(rates: Rates, q: float, q_rate: float, span: float) -> float:
     linear = abs(q) + abs(q_rate) * min(span, rates.response)
     if rates.square_time < math.inf:
         swing = math.sqrt(q * q + q_rate * q_rate * rates.square_time)
-        if not SMALL < swing < LARGE:  # squares have left the range of numbers
+        if not DIED_OUT < swing < 1.0 / DIED_OUT:  # squares have left the range of numbers
             swing = math.hypot(q, q_rate * math.sqrt(rates.square_time))
         linear = min(linear, swing)
     return grown * linear

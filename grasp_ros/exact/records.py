@@ -111,6 +111,7 @@ class Loop(NamedTuple):
     callee: Integers = np.zeros(2, dtype=np.int64)  # (2,) by side, an `Answer` or the address of a function
     laws: Array = np.zeros((2, len(Column)))  # (2, k) rows of `control` by side
     normals: Array = np.zeros((2, 1, 2))  # (2, n, 2) standard normal numbers by side; (2, 1, 2): no noise
+    held: Array = np.zeros(2)  # (2,) last commands by side, N; updated in place
     waiting: Array = np.zeros((0, 3))  # (delay, 3) commands on their way, N by body: a ring; updated in place
 
 

@@ -6,6 +6,7 @@ the number of iterations after which a search changes its method.
 
 from __future__ import annotations
 
+from grasp_ros.physics.domain import CONSTANTS
 from grasp_ros.physics.layout import EPS
 
 # Events and modes. A rounding is EPS = 2^-52 of a number.
@@ -25,17 +26,23 @@ LEFT_OUT = 0.25  # times the accuracy and mu u': the impulse that a pair may neg
 # does not turn back; one whose u' is farther than CLAMPS from -1/p is not clamped. The factors cover the other terms.
 TURNS, CLAMPS = 20.0, 4.0
 
+# Searches for a root.
+BRACKET = 2.0 * EPS  # of its upper end: an interval that is shorter holds no number between its ends
+LAST_CORRECTION, LAST_OF_RISE = 1e-8, 1e-9  # of the result: the last one, because the next is at most its square
+AT_ONCE = EPS * EPS  # of a step: when an event happens that is due at its begin, because events lie in (0, t]
+
 # The begin of a contact without its force.
 FORCE_FREE = 2.0**-56  # of mu v: the impulse that a pair may neglect; EPS / 16, an eighth of a half ulp
 
 # Rest.
 REST = 2.0**-49  # of the scale of a scene: eight roundings, which forces that balance may have
-SETTLED = 40.0  # time constants after which a flight may rest: e^-40 is less than a rounding
+SETTLED = CONSTANTS  # time constants after which a flight may rest
 
 # Displacements computed as such.
 # Flights shorter than SHORT_FLIGHT, or FAR_SHORT where the rest position is beyond FAR, take the power series.
 SHORT_FLIGHT, FAR_SHORT = 0.25, 1.0  # of the time constants
 FAR = 4.0  # times |x|: roundings of a rest position farther away exceed those of x
+TERM = 1e-18  # of the sum: a term of the power series that is smaller is its last
 SHORT_START = 0.2  # of the time constants, well within those of a short flight
 SHORT_WAY = 0.125  # times u at its end: a change of u that is longer has no smaller roundings than u itself
 
@@ -49,6 +56,11 @@ DECAYS = 2.0  # time constants of a damper that a step may span: terms that canc
 # The check of a segment.
 ENERGY = 128.0  # roundings of the sum of all terms: flights, impacts and differences of positions
 NEGLECTED = 100.0  # times the accuracy, of an energy or a way: the error of a step is some first neglected terms
-ENERGY_UNDERFLOW = 1e-300  # J; energies of a motion that died out have few digits
-DIED_OUT = 1e-150  # m; squares and products of less have left the range of numbers
 MAX_IDLE = 1000  # segments without progress in time
+
+# The range of numbers. What is smaller has lost its digits, or its squares and products have.
+ENERGY_UNDERFLOW = 1e-300  # J: energies of a motion that died out have few digits
+DIED_OUT = 1e-150  # m or m/s: squares have left the range of numbers, also those of its inverse
+SMALLEST_RATE = 1e-250  # of an event function, in its unit by s
+SMALLEST_CHANGE = 1e-290  # of a lane in a Taylor step
+STEEP = 1e16  # 1/s: powers of a rate that is larger leave the range

@@ -38,6 +38,13 @@ class Column(IntEnum):
     POSITION_STEP = 6  # resolution of the measured position, m; 0: measured exactly
     VELOCITY_STEP = 7  # m/s
     LIMIT = 8  # largest force of the actuator, N; inf: none
+    PERIOD = 9  # control periods from an answer to the next one, a whole number
+
+
+def is_due(row: Any, tick: int) -> bool:
+    """Whether the controller answers the state of a tick; after any other it repeats its last command."""
+    period = row[Column.PERIOD]
+    return bool(period == 1.0 or tick % period == 0.0)  # the first for speed
 
 
 def measured(row: Any, normals: Any, x: float, v: float) -> tuple[float, float]:
@@ -102,7 +109,7 @@ class ControlLaw:
     def __init__(self, position_gain: float = 0.0, velocity_gain: float = 0.0) -> None:
         self.row: Array = np.zeros(len(Column))
         self.row[: Column.SET_POINT] = position_gain, velocity_gain
-        self.row[Column.LIMIT] = np.inf
+        self.row[Column.LIMIT], self.row[Column.PERIOD] = np.inf, 1.0
         self.seed: tuple[int, int] | None = None
 
     def noise(self, tick: int) -> Array:

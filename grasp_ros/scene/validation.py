@@ -82,8 +82,9 @@ def check_together(source: str, values: Mapping[str, Mapping[str, Any]]) -> None
             if section not in values:
                 raise SceneError(f"{source}: {effect.section}: needs {section}; allowed: a scene that names both")
     for effect in effects:
-        for problem in effect.problems(values):
-            raise SceneError(f"{source}: {problem}")
+        for relation in effect.relations:
+            for problem in relation.problems(values):
+                raise SceneError(f"{source}: {problem}")
 
 
 def check_domain(source: str, values: Mapping[str, Mapping[str, Any]], system: System) -> None:

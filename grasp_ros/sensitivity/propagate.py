@@ -16,7 +16,7 @@ from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import door, kernel
 from grasp_ros.exact.compilation.vectors import load, store
 from grasp_ros.exact.driver.callback import FINISH, REST
-from grasp_ros.exact.driver.intervals import feedback, measured
+from grasp_ros.exact.driver.intervals import feedback, is_due, measured
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, surface_factor
 from grasp_ros.exact.numerics.polynomial import invert_time
@@ -83,8 +83,12 @@ def enter_tick(t: Tangents, tick: int) -> bool:
     slot = tick % delay if delay > 0 else 0
     for body in (LEFT, RIGHT, OBJECT):
         for j in range(t.force.shape[1]):
-            force, edge = answer(t, body, tick, j) if body != OBJECT else (0.0, False)
-            corner = corner or edge
+            force = 0.0
+            if body != OBJECT and is_due(t.control[body], tick):
+                t.held[body, j], edge = answer(t, body, tick, j)
+                corner = corner or edge
+            if body != OBJECT:
+                force = t.held[body, j]
             if delay > 0 and body != OBJECT:
                 force, t.waiting[slot, body, j] = t.waiting[slot, body, j], force
             if tick < t.external.shape[0]:

@@ -21,6 +21,7 @@ from grasp_ros.exact.driver.workspace import zeros
 from grasp_ros.exact.records import Array, Integers, Plant, State, new_run
 from grasp_ros.physics.accuracy import FINEST
 from grasp_ros.physics.control import Column
+from grasp_ros.physics.system import NO_LAW
 from grasp_ros.sensitivity.directions import Directions, no_directions
 
 TERMS = higher_order(series_order(FINEST)) + 1  # of the longest series
@@ -120,6 +121,7 @@ class Tangents(NamedTuple):
     control: Array  # (2, k) laws of sampled controllers, `physics.control`; without gains: none
     control_rates: Array  # (2, k, n)
     normals: Array  # (2, ticks, 2) standard normal numbers of the sensors by side and tick
+    held: Array  # (2, n) of the last commands
     waiting: Array  # (delay, 2, n) of commands on their way: a ring
     external: Array  # (ticks, 3, n)
 
@@ -161,8 +163,8 @@ def tangents_of(plant: Plant, state: State, changes: Directions, times: Array, e
     return Tangents(
         np.zeros(0), state.y, state.mode, state.clock, plant.bodies, plant.pairs, state.y.copy(),
         x, zeros(STATES, wide), zeros(3, 4, wide), _padded(changes.pairs),
-        changes.bodies, np.zeros((3, n)), changes.coulomb[0], np.zeros((2, COLUMNS)), np.zeros((2, COLUMNS, n)),
-        np.zeros((2, 1, 2)), np.zeros((0, 2, n)), changes.external,
+        changes.bodies, np.zeros((3, n)), changes.coulomb[0], np.array([NO_LAW.row] * 2), np.zeros((2, COLUMNS, n)),
+        np.zeros((2, 1, 2)), np.zeros((2, n)), np.zeros((0, 2, n)), changes.external,
         counts, numbers, times[order], order, np.zeros((m, STATES, n)), np.zeros((e, 3, 2 + n)),
         zeros(wide // HALF * BLOCK), np.zeros((ROWS, TERMS)), zeros(5 * WEIGHTS), zeros(2, ROOM), zeros(3, ROOM),
         np.zeros((5, STATES, STATES)), zeros(STATES, wide), zeros(FLOWS))

@@ -103,11 +103,11 @@ class Variants:
         """Sentences for the rows that the scene's rules refuse."""
         uncertain = np.full(self.rows, not self.is_plain)
         if self.is_plain:  # outside a range, with a negative sum of an arm's own number and its feedback's, or outside
-            for name, column in self.changes.items():
-                uncertain |= ~self._parameters[name].holds(column)
             block, bodies = self.block, self.closed_loop
             uncertain |= (bodies[:, : OBJECT, Of.STIFFNESS : Of.FORCE] < 0.0).any(axis=(1, 2))
             with np.errstate(all="ignore"):  # an uncertain row may hold any number
+                for name, column in self.changes.items():
+                    uncertain |= ~self._parameters[name].holds(column)
                 uncertain |= outside_rows(Systems(bodies, block["pairs"], block["state"][..., 0], self.scene.duration))
         found = {}
         for i in np.flatnonzero(uncertain).tolist():

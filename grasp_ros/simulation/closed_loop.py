@@ -17,7 +17,7 @@ from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Loop, new_place, one_interval
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.registry import METHODS
-from grasp_ros.physics.control import FIXED, ControlLaw, Law
+from grasp_ros.physics.control import FIXED, Column, ControlLaw, Law
 from grasp_ros.physics.domain import LARGEST_POSITION, LARGEST_SPEED
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import mapping, names, plain
@@ -159,6 +159,17 @@ def drive(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -> A
     return integrator.run(one_interval(scene.duration, 0.0, len(grid)), grid)
 
 
+def _repeats(scene: Scene, since: float, changes: Changes) -> bool:
+    """Whether the controllers of a scene that is at rest since a time in s answer the same for good.
+
+    Without noise they do if the commands that answer this state, by their last numbers, have arrived and moved nothing.
+    """
+    quiet = all(law.seed is None for law in scene.system.laws.values())
+    slowest = int(scene.system.law_rows[:, Column.PERIOD].max())
+    answered = max(since, scene.time_of(max(changes, default=0)))
+    return quiet and bool(answered <= scene.time_of(scene.ticks - slowest - scene.system.delay))
+
+
 def solve(
     scene: Scene, method: str, problem: Problem, changes: Changes = NO_CHANGES,
     by_user: Mapping[int, UserController] = NO_USER_CONTROLLERS,
@@ -179,6 +190,8 @@ def solve(
     elif scene.system.external:
         problem = problem._replace(drive=lambda integrator: drive_external(scene, integrator, problem.grid))
     found = METHODS[method].solve(problem)
+    if problem.sampled and found.at_rest is not None and (by_user or not _repeats(scene, found.at_rest, changes)):
+        found = found._replace(at_rest=None)
     if not METHODS[method].energy_check:  # it does not look for the domain itself
         inside = (np.abs(found.state) <= np.tile([LARGEST_POSITION, LARGEST_SPEED], 3)).all(axis=1)  # nan is not
         if not inside.all():

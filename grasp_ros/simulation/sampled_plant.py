@@ -101,6 +101,7 @@ class SampledPlant:
         period_ns = given.whole("period_ns", period_ns, 1)
         self._system, self._period_ns, self._period = system, period_ns, float(period_ns / NANOSECONDS)
         self._integrator = Integrator(system, continuous=False) if integrator is None else integrator
+        self._held = np.zeros(2)
         self._waiting = np.zeros((system.delay, 3))  # until the first command arrives nothing acts
 
     @property
@@ -234,7 +235,7 @@ class SampledPlant:
         external = self._system.external_over(ticks) if self._system.external else BARE.external
         loop = Loop(
             np.full(count, self._period), ticks * self._period_ns / NANOSECONDS, outputs.bounds, new_place(self.tick),
-            np.empty((count, 3)), external, answers, law.callee, law.laws, law.normals, self._waiting,
+            np.empty((count, 3)), external, answers, law.callee, law.laws, law.normals, self._held, self._waiting,
         )
         states = self._integrator.run(loop, outputs.offsets, rows)
         done = int(loop.place[Place.INTERVAL])

@@ -63,7 +63,7 @@ class Trajectory(Motion, Frozen):
         Names of the controllers that acted in place of the scene's feedback, by side.
     at_rest : float or None
         Time in s from which everything stays at rest, see `exact.driver.rest`. None: never, by another method, or
-        under held commands, which may change.
+        under held commands that may change: with noise, by a user's controller, or while older ones are delayed.
     sensitivity : Sensitivity or None
         Derivatives of the motion, where `simulate` was asked for them; see `differentiate.Sensitivity`. They are
         not saved.

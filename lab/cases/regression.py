@@ -138,25 +138,25 @@ def _relative(changes: Array, size: Array) -> Array:
         return np.where(changes == 0.0, 0.0, np.abs(changes) / size)
 
 
-def nearby(scene: Scene, draws: int) -> list[Scene]:
-    """The scene with some of its numbers smaller by one rounding, drawn so often, where scenes may be so."""
+def nearby(scene: Scene, draws: int, part: float = EPS) -> list[Scene]:
+    """The scene with some of its numbers smaller by a part, one rounding, drawn so often, where scenes may be so."""
     found: list[Scene] = []
     for seed in range(TRIES):
         with suppress(SceneError):  # k + Kp = 0 must not become negative
-            found.append(scene.changed(_changes(scene, np.random.default_rng(seed))))
+            found.append(scene.changed(_changes(scene, np.random.default_rng(seed), part)))
         if len(found) == draws:
             break
     return found
 
 
-def _changes(scene: Scene, draw: np.random.Generator) -> dict[str, Any]:
-    """The numbers of the scene, some of them smaller by one rounding."""
+def _changes(scene: Scene, draw: np.random.Generator, part: float) -> dict[str, Any]:
+    """The numbers of the scene, some of them smaller by a part."""
     changes: dict[str, Any] = {}
     for section, numbers in scene.values.items():
         for key, value in numbers.items():
             if section in EXACT or key in TIMES or isinstance(value, int):
                 continue
-            factors = 1.0 - EPS * draw.integers(0, 2, np.size(value))
+            factors = 1.0 - part * draw.integers(0, 2, np.size(value))
             moved = (np.atleast_1d(value) * factors).tolist()
             changes[f"{section}.{key}"] = tuple(moved) if isinstance(value, tuple) else moved[0]
     return changes

@@ -177,8 +177,10 @@ def look(run: Trajectory, pieces: Pieces, product: Product) -> Detail:
 def _held(run: Trajectory) -> float:
     """Number of ticks at which other inputs acted than the laws answer to the states, late by the delay."""
     system, states = run.scene.system, np.nan_to_num(run.state)
-    answers = [np.zeros(3)] * system.delay + [commands(system, tick, state) for tick, state in enumerate(states[:-1])]
-    wanted = [answers[tick] + system.external_at(tick) for tick in range(len(states) - 1)]
+    answers = [np.zeros(3)] * (system.delay + 1)
+    for tick, state in enumerate(states[:-1]):
+        answers.append(commands(system, tick, state, answers[-1]))
+    wanted = [answers[tick + 1] + system.external_at(tick) for tick in range(len(states) - 1)]
     return float(np.count_nonzero((np.array(wanted) != run.inputs[:-1]).any(axis=1)))
 
 

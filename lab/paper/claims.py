@@ -65,15 +65,12 @@ class Check(NamedTuple):
         return any(abs(self.share - bound) < 2.0 * error for bound in (ALMOST_ALL, HALF))
 
     @property
-    def short(self) -> str:
-        """In a line: of a sweep how many of its values, not each; of random starts no range."""
-        value = self.value
-        if self.kind is Kind.SWEEP and ": " in value:
-            _, _, other = value.partition("; ")
-            value = f"in {self.share:.0%} of its values" + (f", {other}" if other else "")
-        elif self.kind is Kind.RANDOM:
-            value = value.partition(", from")[0]
-        return f"{self.kind.value}, {self.text}: {value}"
+    def brief(self) -> str:
+        """What was found: of a sweep how many of its values, not each; of random starts no range."""
+        if self.kind is Kind.SWEEP and ": " in self.value:
+            _, _, other = self.value.partition("; ")
+            return f"in {self.share:.0%} of its values" + (f", {other}" if other else "")
+        return self.value.partition(", from")[0] if self.kind is Kind.RANDOM else self.value
 
 
 class Part(NamedTuple):
@@ -101,15 +98,20 @@ class Part(NamedTuple):
         return [check for check in self.checks if check.kind in DECISIVE and not check.holds]
 
     @property
+    def gravest(self) -> Check:
+        """What weighs most of the limits, if there are any."""
+        return next((check for check in self.limits if check.kind is Kind.RANDOM), self.limits[0])
+
+    @property
     def limits_in_short(self) -> str:
-        """What weighs most of them, and how many more there are."""
-        drawn = [check for check in self.limits if check.kind is Kind.RANDOM]
-        return _first([check.short for check in drawn or self.limits], len(self.limits))
+        """The gravest, and how many more there are."""
+        check = self.gravest
+        return f"{check.kind.value}, {check.text}: {check.brief}{_more(self.limits)}"
 
     @property
     def turned_in_short(self) -> str:
         """The first of `turned`, and how many more there are."""
-        return _first([check.text for check in self.turned], len(self.turned))
+        return self.turned[0].text + _more(self.turned)
 
     @property
     def close(self) -> list[Check]:
@@ -136,10 +138,15 @@ class Claim(NamedTuple):
     parts: Sequence[Part]
 
     @property
+    def weakest(self) -> Part:
+        """The part that decides: the first of those with the weakest verdict."""
+        order = list(Verdict)
+        return min((part for part in self.parts if not part.reading), key=lambda part: order.index(part.verdict))
+
+    @property
     def verdict(self) -> Verdict:
         """That of the weakest part."""
-        order = list(Verdict)
-        return min((part.verdict for part in self.parts if not part.reading), key=order.index)
+        return self.weakest.verdict
 
     @property
     def turned(self) -> list[Part]:
@@ -180,6 +187,6 @@ def tally(claims: Sequence[Claim]) -> list[str]:
             for count, words in found]
 
 
-def _first(texts: Sequence[str], whole: int) -> str:
-    """The first of so many."""
-    return texts[0] + (f", and {whole - 1} more" if whole > 1 else "")
+def _more(checks: Sequence[Check]) -> str:
+    """How many there are beside one of them."""
+    return f", and {len(checks) - 1} more" if len(checks) > 1 else ""

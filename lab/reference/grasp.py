@@ -6,12 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.physics.control import ControlLaw
+from grasp_ros.physics.control import ControlLaw, is_due
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
 from grasp_ros.physics.model import Arm, Array, Contact, impact_force, penetration
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene import PAPER, Scene
+
+NOTHING = np.zeros(3)
 
 
 class Grasp(NamedTuple):
@@ -44,11 +46,12 @@ def system_of(grasp: Grasp, state: Array) -> System:
     return system
 
 
-def commands(system: System, tick: int, state: Array) -> Array:
-    """What the controllers answer to a state (6,) at a tick, (3,) in N by body; 0 without a controller."""
-    forces = np.zeros(3)
+def commands(system: System, tick: int, state: Array, last: Array = NOTHING) -> Array:
+    """Commands at a tick with a state (6,), (3,) in N by body: answers, or the last ones; 0 without a controller."""
+    forces = last.copy()
     for side, law in system.laws.items():
-        forces[side] = law.command(tick, *state[COLUMN[side] : COLUMN[side] + 2].tolist())
+        if is_due(law.row, tick):
+            forces[side] = law.command(tick, *state[COLUMN[side] : COLUMN[side] + 2].tolist())
     return forces
 
 

@@ -13,7 +13,9 @@ import numpy as np
 from gmpy2 import mpfr
 from numpy.typing import NDArray
 
+from grasp_ros.physics.control import is_due
 from grasp_ros.scene import Scene
+from grasp_ros.scene.effects.base import NANOSECONDS
 from lab.reference.automaton import Event
 from lab.reference.plant import LEFT, OBJECT, RIGHT, Body, Law, Plant, Real, Reals, number
 from lab.reference.run import EXPONENTS, Row, Run, Spent, precision
@@ -86,15 +88,19 @@ def integrate(scene: Scene, times: Iterable[Real], digits: int = 25, budget: flo
         plant = _plant(scene, exact)
         start = [exact(value) for value in (system.state.tolist() if state is None else state)]
         run = Run(plant, *_by_body(start), grid, digits, budget)
-        waiting = [[mpfr(0)] * 3] * system.delay
+        commands: Reals = [mpfr(0)] * 3
+        waiting = [commands] * system.delay
         try:
             for tick, following in pairwise(_ticks(scene)):
                 forces = [exact(force) for force in system.external_at(tick).tolist()]
                 if scene.sampled:
-                    waiting.append(_commands(scene, tick, run))
+                    commands = _commands(scene, tick, run, commands)
+                    waiting.append(commands)
                     forces = [a + b for a, b in zip(forces, waiting.pop(0), strict=True)]
                 run.enter(_pushed(plant, forces))
-                run.advance(min(exact(float(scene.time_of(following))), grid[-1]))
+                # a tick is a whole number of nanoseconds: as a float 5.02 s is 4e-16 s less
+                run.advance(grid[-1] if following == scene.ticks
+                            else min(mpfr(following * scene.period_ns) / NANOSECONDS, grid[-1]))
                 if len(run.rows) == len(grid):
                     break
         except Spent:
@@ -132,9 +138,10 @@ def _pushed(plant: Plant, forces: Reals) -> Plant:
     return plant._replace(bodies=(left, right, thing))
 
 
-def _commands(scene: Scene, tick: int, run: Run) -> Reals:
-    """What the controllers answer, by body."""
-    answers = [mpfr(0)] * 3
+def _commands(scene: Scene, tick: int, run: Run, last: Reals) -> Reals:
+    """The commands, by body: what the controllers answer, or repeat."""
+    forces = [*last]
     for side, law in scene.system.laws.items():
-        answers[side] = number(law.command(tick, run.state.x[side], run.state.v[side]))
-    return answers
+        if is_due(law.row, tick):
+            forces[side] = number(law.command(tick, run.state.x[side], run.state.v[side]))
+    return forces

@@ -162,6 +162,7 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ("lab accuracy --quick --docs file/x", "file/x/accuracy.md: cannot be written"),
     ("lab effects --docs file/x", "file/x/costs.md: cannot be written: Not a directory"),
     ("lab certificate --docs file/x", "file/x/jumps.md: cannot be written: Not a directory"),
+    ("lab digits --docs file/x", "file/x/digits.md: cannot be written: Not a directory"),
     ("lab hard --docs file/x", "file/x/hard.md: cannot be written: Not a directory"),
     ("lab fuzz --seconds nan", "--seconds nan is not allowed"),
     ("lab fuzz --seed -1", "--seed: -1 is not allowed"),

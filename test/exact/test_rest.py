@@ -74,6 +74,29 @@ def test_a_pulse_wakes_what_rests() -> None:
     assert run.at_rest is None or run.at_rest > last
 
 
+def test_held_commands_rest_if_they_repeat() -> None:
+    still = simulate(horizon("preload", 10.0), sampled=True)
+    assert still.at_rest is not None
+    assert np.ptp(still.state[still.t > still.at_rest], axis=0).max() == 0.0
+    begin = round(still.at_rest / still.scene.time_of(1))
+    for ticks, rests in ((begin, False), (begin + 1, True)):
+        seconds = still.scene.time_of(ticks)
+        assert (simulate(horizon("preload", seconds), sampled=True).at_rest == still.at_rest) == rests
+
+
+def test_held_commands_that_may_change_do_not_rest() -> None:
+    late = horizon("preload", 10.0, "loop.delay_ticks=5")
+    change = {"left_feedback.set_point_m": 0.03}
+    assert simulate(late).at_rest is not None
+    assert simulate(late, changes={9996: change}).at_rest is None  # it arrives after the end
+    assert simulate(horizon("preload", 10.0, "loop={}", "left_rate.period_ticks=9000")).at_rest is None
+    for key, rests in (("position_noise_m=1e-30", False), ("position_step_m=1e-6", True)):
+        measured = horizon("preload", 10.0, "loop={}", "left_sensor.noise_seed=1", f"left_sensor.{key}")
+        assert (simulate(measured).at_rest is not None) == rests
+    user = {"left": lambda tick, time, x, v: 0.0}
+    assert simulate(horizon("preload", 100.0), controllers=user).at_rest is None
+
+
 def test_another_input_wakes_what_rests() -> None:
     integrator = Integrator(scenes.load("preload").system, continuous=True)
     integrator.advance(100.0)

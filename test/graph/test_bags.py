@@ -25,7 +25,7 @@ from sensor_msgs.msg import JointState
 from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.recorder import HEAD
-from grasp_ros.graph.bag.verify import laws_of, verify
+from grasp_ros.graph.bag.verify import answers_of, laws_of, verify
 from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.ros import messages
 from grasp_ros.physics.accuracy import ACCURACY
@@ -225,7 +225,7 @@ def test_run_reports_and_draws(two_runs: tuple[Path, Path]) -> None:
     assert (two_runs[0] / "figure.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("name", ["noise", "hammer", "no_contact", "everything", "friction_slide"])
+@pytest.mark.parametrize("name", ["noise", "hammer", "no_contact", "rates", "everything", "friction_slide"])
 def test_a_scene_with_effects_is_the_same_everywhere(tmp_path: Path, name: str) -> None:
     """Simulation, graph and bag; and nothing is there that the scene does not name.
 
@@ -233,7 +233,7 @@ def test_a_scene_with_effects_is_the_same_everywhere(tmp_path: Path, name: str) 
     """
     more = ["object_pulse.start_s=0.3", "left_actuator.limit_N=30"] if name == "everything" else []
     settings = ["time.duration_s=1.0", *more]
-    one = name in ("noise", "hammer", "no_contact")
+    one = name in ("noise", "hammer", "no_contact", "rates")
     graph = Graph(scene.load(name, settings), tmp_path / "run", ACCURACY, one_process=one)
     with started(graph) as statuses:
         graph.wait([])
@@ -247,6 +247,8 @@ def test_a_scene_with_effects_is_the_same_everywhere(tmp_path: Path, name: str) 
         assert inputs[0].tolist() == [0.0, 0.0, 0.0]
         assert (np.nanmax(np.abs(inputs[:, LEFT])), np.nanmax(inputs[:, OBJECT])) == (30.0, 30.0)
     assert not recording.lyapunov[:, 5].any()
+    assert recording.lyapunov[:, 8].all()  # the laws are known
+    assert not any(answers.differs for answers in answers_of(recording).values())
     assert {topic for topic, _, _ in content(tmp_path / "run")} == {
         "/scene", "/run", "/clock", *(f"/{topic.name}" for topic in recording.scene.topics),
         *(f"/{name.removesuffix('_controller')}/parameters" for name in recording.scene.controllers),

@@ -37,17 +37,16 @@ class Late:
         self.coming.append(-5.0 * (x - set_point) - 0.5 * v + 2.0 * (x_object - x_other) - 0.01 * impact)
         return self.coming.popleft()
 class Slow:
-    "It answers every fifth tick, and holds that."
-    force = 0.0
+    "It counts its answers: the scene asks it every fifth tick."
+    count = 0
     def __call__(self, tick, time, x, v, v_object, v_other, impact, impact_other):
-        if tick % 5 == 0:
-            self.force = -5.0 * x - 0.5 * v - 0.1 * (v_object + v_other) + 0.01 * (impact - impact_other)
-        return self.force
+        self.count += 1
+        return -5.0 * x - 0.5 * v - 0.1 * (v_object + v_other) + 0.01 * (impact - impact_other) + 1e-3 * self.count
 """
 SETTINGS = [
     "time.duration_s=0.7", "loop.delay_ticks=2", "left_feedback.set_point_m=0.01", "left_sensor.noise_seed=3",
     "left_sensor.position_noise_m=1e-4", "right_sensor.noise_seed=4", "right_sensor.velocity_noise_m_per_s=1e-3",
-    "right_sensor.position_step_m=1e-4", "right_actuator.limit_N=2.5",
+    "right_sensor.position_step_m=1e-4", "right_actuator.limit_N=2.5", "right_rate.period_ticks=5",
 ]
 
 
@@ -71,6 +70,9 @@ def from_the_bag(recording: Recording, side: int, law: Any) -> list[float]:
         assert given.keys() == set(OBSERVABLES)
         asked = type(law).__call__.__code__.co_varnames
         known = {name: float(value) for name, value in given.items() if name in asked}
+        if not control.is_due(recording.scene.system.laws[side].row, int(recording.tick[row])):
+            answers.append(answers[-1])
+            continue
         force = law(int(recording.tick[row]), float(recording.t[row]), *measured[column : column + 2], **known)
         answers.append(min(max(force, -2.5), 2.5) if side == RIGHT else force)
     return answers

@@ -9,6 +9,7 @@ tests of their own hold the cases within their bounds.
 from __future__ import annotations
 
 import csv
+import functools
 import re
 import subprocess
 from collections.abc import Iterator, Sequence
@@ -22,11 +23,14 @@ from jinja2 import Environment, nodes
 from grasp_ros import scene as scenes
 from grasp_ros.accuracy.measure import contender_of
 from grasp_ros.methods.registry import EXACT
-from grasp_ros.simulation import GRID_POINTS
+from grasp_ros.simulation import GRID_POINTS, simulate
 from lab.cases.registry import cases
 from lab.drills.faults import run as faults
 from lab.paper import page as paper
-from lab.studies import accuracy, certificate, derivatives, domain, effects, hard, pages
+from lab.paper.cases import FIGURES
+from lab.paper.equation_table import EQUATIONS
+from lab.paper.statements import STATEMENTS
+from lab.studies import accuracy, certificate, derivatives, digits, domain, effects, hard, pages
 
 DOCS = Path(__file__).parents[2] / "docs"
 ALLOWED = timedelta(days=30)
@@ -34,7 +38,8 @@ MOTION = ("grasp_ros/physics", "grasp_ros/scene", "grasp_ros/exact", "grasp_ros/
 MEASURED = {  # what the numbers of a page depend on
     "accuracy": (*MOTION, "grasp_ros/methods"), "costs": MOTION,
     "derivatives": (*MOTION, "grasp_ros/sensitivity", "lab/oracles"),
-    "faults": ("grasp_ros/graph", "lab/drills/faults"), "fuzz": (*MOTION, "lab/cases", "lab/oracles"),
+    "digits": (*MOTION, "config", "lab/reference"), "faults": ("grasp_ros/graph", "lab/drills/faults"),
+    "fuzz": (*MOTION, "lab/cases", "lab/oracles"),
     "hard": (*MOTION, "lab/cases"), "jumps": MOTION, "maps": (*MOTION, "grasp_ros/observe", "grasp_ros/maps"),
     "paper": (*MOTION, "lab/paper"),
 }
@@ -135,6 +140,23 @@ def test_the_hard_cases_are_those_of_the_code() -> None:
     assert rows == [(case.family.name, case.name, f"{case.bound:.1g}") for case in cases()]
 
 
+def test_the_digits_are_those_of_all_scenes() -> None:
+    rows = {row["scene"]: row for row in table("digits")}
+    assert sorted(rows) == sorted(scenes.names())
+    assert all(digits.UNKNOWN not in row["reason"] for row in rows.values())
+    assert [row[0] for row in cells("digits", "scene")] == [
+        name for name in sorted(rows, key=lambda name: -float(rows[name]["ratio"]))
+        if float(rows[name]["ratio"]) <= digits.MOST][: digits.WORST]
+
+
+def test_a_run_is_told_from_one_with_larger_errors(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = scenes.load("hammer")
+    assert 0.0 < digits.measure(scene).ratio <= digits.MOST
+    coarse = functools.partial(simulate, setting=1e-12)
+    monkeypatch.setattr(digits, "simulate", coarse)
+    assert digits.measure(scene).reasons == [digits.UNKNOWN]
+
+
 def test_the_regression_scenes_are_counted() -> None:
     numbers = hard.regression_numbers()
     assert cells("hard", "rule") == numbers["refused"]
@@ -143,3 +165,18 @@ def test_the_regression_scenes_are_counted() -> None:
 
 def test_the_faults_are_those_of_the_code() -> None:
     assert [row["fault"] for row in table("faults")] == [drill.fault for drill in faults.all_drills()]
+
+
+def test_the_statements_of_the_paper_are_those_of_the_code() -> None:
+    rows = {section: [row for row in table("paper") if row["section"] == section] for section in (
+        "statements", "checks", "equations")}
+    parts = {f"{each.key}.{number}": part for each in STATEMENTS.values() for number, part in enumerate(each.parts, 1)}
+    found = {row["number"]: row["statement"] for row in rows["statements"]}
+    assert list(found) == list(parts)
+    expected = {number: getattr(part, "statement", found[number]) for number, part in parts.items()}
+    assert found == expected
+    assert {found[row["number"]] for row in rows["checks"]} == {*found.values()}
+    assert [row["number"] for row in rows["equations"]] == [name.split()[0] for name in EQUATIONS]
+    assert [row[1] for row in cells("paper", "figure")] == [figure.caption for figure in FIGURES]
+    lines = re.findall(r"^\| ([PCT]\d+) \| (.*?) \| \*\*", page("paper"), re.M)
+    assert lines == [(each.key, each.statement) for each in STATEMENTS.values()]

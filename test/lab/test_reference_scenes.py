@@ -72,12 +72,13 @@ def test_a_stuck_object_is_a_wall_until_it_slips() -> None:
 
 
 def test_a_stuck_object_slips_when_it_is_pushed_at_a_tick() -> None:
-    """F = 1 N: 5 N for 0.4 s give 8 m/s^2, then friction takes 2 m/s^2."""
-    scene = made(1.0, 0.1, left_arm=body(1.0, -1.0), object=body(0.5), left_contact=CONTACT,
-                    object_friction={"coulomb_N": 1.0}, object_pulse={"force_N": 5.0, "start_s": 0.2, "length_s": 0.4})
-    found = integrate(scene, [0.2, 0.6, 1.0])
+    """F = 1 N: 5 N for 0.375 s give 8 m/s^2, then friction takes 2 m/s^2."""
+    pulse = {"force_N": 5.0, "start_s": 0.25, "length_s": 0.375}
+    scene = made(1.0, 0.125, left_arm=body(1.0, -1.0), object=body(0.5), left_contact=CONTACT,
+                    object_friction={"coulomb_N": 1.0}, object_pulse=pulse)
+    found = integrate(scene, [0.25, 0.625, 1.0])
     assert [[float(number) for number in row[2:4]] for row in found.state] == [
-        [0.0, 0.0], pytest.approx([0.64, 3.2]), pytest.approx([1.76, 2.4])]
+        [0.0, 0.0], pytest.approx([0.5625, 3.0]), pytest.approx([1.546875, 2.25])]
     assert [(event.body, event.kind) for event in found.events] == [(2, "slip")]
 
 
@@ -85,6 +86,14 @@ def test_forces_change_at_ticks() -> None:
     scene = made(1.0, 0.25, left_arm=body(2.0), left_arm_pulse={"force_N": 8.0, "start_s": 0.25, "length_s": 0.5})
     found = integrate(scene, [0.25, 0.5, 1.0])
     assert [row[:2] for row in found.state] == [(0, 0), (mpfr("0.125"), 1), (1, 2)]
+
+
+def test_ticks_are_whole_nanoseconds() -> None:
+    """As a float 5.02 s is less by 4e-16 s, and the speed would be by 3e-14 m/s."""
+    scene = made(6.0, 0.01, object=body(0.5), object_pulse={"force_N": 30.0, "start_s": 5.0, "length_s": 0.02})
+    found = integrate(scene, [5.0, 6.0])
+    assert found.state[0][3] == 0
+    assert close(found.state[1][3], "1.2")
 
 
 @pytest.mark.parametrize("delay", [0, 2])

@@ -31,7 +31,7 @@ SENSOR = ("loop={}", "left_sensor.noise_seed=1")
     ("case_01", ("loop={}", "left_actuator.limit_N=1", "left_feedback.feed_forward_N=-2"),
      "left_actuator.limit_N: 1.0 is less than left_feedback.feed_forward_N alone"),
     ("case_01", ("loop={}", "right_feedback.velocity_gain_Ns_per_m=1e5"),
-     "is too long for right_feedback: while the right arm touches nothing, it swings 99 times as far every period"),
+     "is too long for right_feedback: while the right arm touches nothing, it swings 99 times as far from answer to"),
     ("case_01", ("loop.delay_ticks=20", "left_feedback.velocity_gain_Ns_per_m=100"),
      "time.control_period_s: 0.001 is too long for left_feedback"),
     ("case_01", ("loop.delay_ticks=0",), "loop.delay_ticks: 0 has no effect; meant: a delay above 0, or loop: {}"),

@@ -102,11 +102,14 @@ def test_arrays_are_built_and_refused_like_scenes() -> None:
         "left_feedback.set_point_m=0.01", "right_feedback.set_point_m=0.02", "left_feedback.feed_forward_N=0.3",
         "right_feedback.feed_forward_N=0.1", "object_friction.viscous_Ns_per_m=0.1", "object_friction.coulomb_N=0.2",
         "loop={}", *(f"{side}_{key}" for side in ("left", "right") for key in (
-            "actuator.limit_N=3", "sensor.noise_seed=1", "sensor.position_noise_m=0.1", "sensor.position_step_m=0.1",
+            "rate.period_ticks=2", "actuator.limit_N=3",
+            "sensor.noise_seed=1", "sensor.position_noise_m=0.1", "sensor.position_step_m=0.1",
             "sensor.velocity_noise_m_per_s=0.1", "sensor.velocity_step_m_per_s=0.1")),
     ])
     rng = np.random.default_rng(3)
     named = {name: rng.normal(1.0, 2.0, 200) for name in PLACES}
+    named = {name: np.where(rng.random(200) < 0.8, np.rint(values), values) if name.endswith("_ticks") else values
+             for name, values in named.items()}
     for name, values in named.items():
         variants = Variants(scene, {name: values})
         assert variants.is_plain

@@ -16,7 +16,7 @@ from grasp_ros.exact.kinematics import approach, rate_lanes
 from grasp_ros.exact.numerics.polynomial import lane_bounds, values
 from grasp_ros.exact.numerics.roots import first_rise, value_and_rate
 from grasp_ros.exact.records import Array, Candidate, Integers, Plant, Push, State, Tables
-from grasp_ros.exact.tolerances import FRICTION, SLIDES
+from grasp_ros.exact.tolerances import AT_ONCE, FRICTION, SLIDES
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Of, Pair, Slide, U, V, Z
 
 
@@ -162,7 +162,7 @@ def excess(tables: Tables, plant: Plant, n: int, s: float) -> float:
 def since_certain(tables: Tables, plant: Plant, mode: Integers, n: int, h: float) -> Candidate:
     """From which s on the force exceeds the friction by more than the rounding, as it does at h; by bisection."""
     low, high = 0.0, h
-    while high - low > 4.0 * EPS * high and high > EPS * EPS * h:
+    while high - low > 4.0 * EPS * high and high > AT_ONCE * h:
         middle = 0.5 * (low + high)
         if excess(tables, plant, n, middle) > noise_at(tables, plant, mode, n, middle):
             high = middle
@@ -179,7 +179,7 @@ def overcome(f: Array, n: int, h: float, noise: tuple[float, float], work: Integ
     `noise` is the rounding at 0 and at h. If |f(0)| is within the one at 0, that one counts, otherwise the smaller one.
     """
     if f[0] > noise[0]:
-        return EPS * EPS * h
+        return AT_ONCE * h
     f[0] -= noise[0] if f[0] >= -noise[0] else min(noise[0], noise[1])
     return first_rise(f, n, h, 0.0, work)
 

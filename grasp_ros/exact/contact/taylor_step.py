@@ -17,12 +17,11 @@ from grasp_ros.exact.kinematics import own_size
 from grasp_ros.exact.numerics.polynomial import INVERSE, curvatures, values
 from grasp_ros.exact.numerics.powers_of_two import near_exp2, near_inverse, near_log2, orders_to_one, power_of_two
 from grasp_ros.exact.records import Array, Integers, Lanes, Order, Plant, Segment, Settings, State, Step, Tables
-from grasp_ros.exact.tolerances import DEFECT, STILL
+from grasp_ros.exact.tolerances import DEFECT, SMALLEST_CHANGE, STILL
 from grasp_ros.physics.impact_law import STORED_ROOT
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Kind, Lane, Pair, U, V, Work, X, Z
 
 TAIL = STORED_ROOT  # at a touch with p = 0 all coefficients between multiples of it are zero
-SMALLEST = 1e-290  # of a change
 BELOW, ABOVE = 0.5, 2.0  # length / reach, between which the changes within the reach hold for the step
 FAR_BELOW, FAR_ABOVE = 2.0**-10, 2.0**5  # steps whose unit does not fit; a small unit lets terms underflow
 MOST = 16  # binary orders by which a unit is changed at once
@@ -101,14 +100,14 @@ def pulls(plant: Plant, y: Array) -> tuple[float, float, float]:
 def depth_size(z: float, touches: bool, size: float, moved: float) -> float:
     """Size of the lane of a pair whose u moves by `moved`."""
     if touches:
-        return max(size, moved * near_inverse(2.0 * z)) if z > SMALLEST else size
+        return max(size, moved * near_inverse(2.0 * z)) if z > SMALLEST_CHANGE else size
     return max(size, moved)
 
 
 @inlined
 def inverse(size: float) -> float:
     """1 / size; 0 for what does not move."""
-    return near_inverse(size) if size > SMALLEST else 0.0
+    return near_inverse(size) if size > SMALLEST_CHANGE else 0.0
 
 
 @inlined

@@ -20,7 +20,8 @@ from grasp_ros.physics import control
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Answer, Of, Outcome, Place, V
 
 FIRST = whole(0)  # interval
-measured, feedback, limited = kernel(control.measured), kernel(control.feedback), kernel(control.limited)
+is_due, measured = kernel(control.is_due), kernel(control.measured)
+feedback, limited = kernel(control.feedback), kernel(control.limited)
 
 
 @inlined
@@ -33,6 +34,9 @@ def answer(state: State, loop: Loop, k: int) -> bool:
         callee, row = loop.callee[side], loop.laws[side]
         if callee == Answer.GIVEN:
             continue
+        if not is_due(row, loop.place[Place.TICK] + k):
+            loop.answers[k, side] = loop.held[side]
+            continue
         x, v, _ = arm_of(state.y, side)
         x, v = measured(row, loop.normals[side, min(k, loop.normals.shape[1] - 1)], x, v)
         if callee == Answer.LAW:
@@ -42,7 +46,7 @@ def answer(state: State, loop: Loop, k: int) -> bool:
             if not math.isfinite(force):
                 loop.place[Place.FAILED] = side
                 return False
-        loop.answers[k, side] = limited(row, force)
+        loop.held[side] = loop.answers[k, side] = limited(row, force)
     return True
 
 
@@ -87,11 +91,11 @@ def enter_interval(plant: Plant, state: State, loop: Loop, out: Output, grid: Ar
 
 @inlined
 def rest(state: State, loop: Loop) -> None:
-    """Skip what is left of an interval at rest; with controllers no time of rest is kept: they may move it."""
+    """Skip what is left of an interval at rest, and keep the time since when nothing moves."""
     put(state, V.L, 0.0)
     put(state, V.O, 0.0)
     put(state, V.R, 0.0)
-    if loop.answers.shape[0] == 0 and state.rest[SINCE] == math.inf:
+    if state.rest[SINCE] == math.inf:
         state.rest[SINCE] = (state.clock[0] + state.clock[1]) + state.clock[2]
     state.clock[0], state.clock[1] = loop.lengths[loop.place[Place.INTERVAL]], 0.0
 

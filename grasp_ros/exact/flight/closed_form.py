@@ -11,7 +11,7 @@ from grasp_ros.exact.compilation.jit import inlined, kernel, whole
 from grasp_ros.exact.kinematics import rates_of
 from grasp_ros.exact.numerics.polynomial import INVERSE
 from grasp_ros.exact.records import Array, Flight, Flights, Flown, Order, Plant, Rates, Regime, Step
-from grasp_ros.exact.tolerances import FAR, FAR_SHORT, SETTLED, SHORT_FLIGHT
+from grasp_ros.exact.tolerances import FAR, FAR_SHORT, SETTLED, SHORT_FLIGHT, TERM
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Of, V, X
 
 FLIGHT_ORDER = whole(16)  # (1/2)^16 / 16! is below rounding; typed, or numba compiles its users once more
@@ -115,7 +115,7 @@ def short_flight(v: float, push: float, sigma: float, omega0_2: float, t: float)
         following = (drag * term + spring * (before * INVERSE[n])) * share
         before, term = term, following
         n += 1
-        if abs(term) <= 1e-18 * abs(change) and abs(before) <= 1e-18 * abs(change):
+        if abs(term) <= TERM * abs(change) and abs(before) <= TERM * abs(change):
             break
     return position, change
 

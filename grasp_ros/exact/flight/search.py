@@ -21,11 +21,11 @@ from grasp_ros.exact.flight.closed_form import fly
 from grasp_ros.exact.kinematics import bound_by, envelope_step, rates_of
 from grasp_ros.exact.numerics.roots import safe_step
 from grasp_ros.exact.records import Array, Flights, Integers, Motion, PairFlight, Plant, Rates
+from grasp_ros.exact.tolerances import BRACKET, LAST_CORRECTION, SMALLEST_RATE
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, Body, Law, Transition, U, Work
 
 MAX_ITERATIONS = 100_000  # after which a flight goes on from where the search is
 MAX_NEWTON, MAX_REFINEMENTS = 20, 200
-SMALLEST = 1e-250  # of a rate: products of what is smaller have lost their digits
 
 
 class Derivatives(NamedTuple):
@@ -96,7 +96,7 @@ def certain_step(g: EventSeries, curvature: float, growth: float, last: float) -
     """Time for which g stays below 0: by the bound on |g''|, or by g'' now and its largest change if that is longer."""
     below = min(g.value, -g.noise)
     step = safe_step(below, g.rate, curvature)
-    reach = min(4.0 * max(step, last), 1.0 / SMALLEST)  # finite: `growth` may be 0
+    reach = min(4.0 * max(step, last), 1.0 / SMALLEST_RATE)  # finite: `growth` may be 0
     bend = max(g.second + g.second_noise + growth * reach, 0.0)
     if bend < 0.5 * curvature:
         step = max(step, min(reach, safe_step(below, g.rate, bend)))
@@ -106,7 +106,7 @@ def certain_step(g: EventSeries, curvature: float, growth: float, last: float) -
 @inlined
 def reach_of_root(g: EventSeries, growth: float, left: float) -> float:
     """Time within which g has exactly one root, as g' keeps half of its size until then; 0 if that is not known."""
-    if not (g.value < 0.0 and g.rate > SMALLEST):
+    if not (g.value < 0.0 and g.rate > SMALLEST_RATE):
         return 0.0
     reach = -2.0 * g.value / g.rate
     lost = reach * (max(g.second_noise - g.second, 0.0) + growth * reach)
@@ -123,7 +123,7 @@ def root_of_series(g: EventSeries) -> float:
         rate = ((4.0 * four * t + 3.0 * three) * t + 2.0 * two) * t + g.rate
         step = value / rate
         t -= step
-        if abs(step) <= 1e-8 * abs(t):
+        if abs(step) <= LAST_CORRECTION * abs(t):
             return t
     return math.nan
 
@@ -144,7 +144,7 @@ def root_between(kind: Transition, pair: PairFlight, low: float, high: float, g:
         elif growth * pair.square_rate * abs(step) ** 5 <= 8.0 * EPS * t * g.rate:
             return t + step
         t += step
-        if high - low <= 2.0 * EPS * high:
+        if high - low <= BRACKET * high:
             return t
         work[Work.ROOT_ITERATIONS] += 1
         at = motion_at(pair, t)

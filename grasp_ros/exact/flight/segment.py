@@ -14,10 +14,8 @@ from grasp_ros.exact.flight.search import first_root, motion_at, pair_in_flight
 from grasp_ros.exact.kinematics import approach, arm_of, is_resting, next_derivative, own_acceleration
 from grasp_ros.exact.numerics.polynomial import values
 from grasp_ros.exact.records import Array, Candidate, Ends, Integers, Motion, Plant, Segment, Settings, State, Tables
-from grasp_ros.exact.tolerances import TOGETHER
+from grasp_ros.exact.tolerances import STEEP, TOGETHER
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Kind, Of, Pair, Transition, U, V, Work, X
-
-STEEP = 1e16  # rate in 1/s whose powers leave the range of numbers
 
 
 @inlined

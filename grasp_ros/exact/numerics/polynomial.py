@@ -13,8 +13,8 @@ import numpy as np
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.compilation.vectors import add_product, load, sizes, store
 from grasp_ros.exact.records import Array, Step
-from grasp_ros.exact.tolerances import NOISE
-from grasp_ros.physics.layout import EPS, LANES, Lane, V, Z
+from grasp_ros.exact.tolerances import BRACKET, LAST_CORRECTION, NOISE
+from grasp_ros.physics.layout import LANES, Lane, V, Z
 
 INVERSE = np.array([0.0, *(1.0 / n for n in range(1, 100))])  # a quotient would keep the next one waiting
 
@@ -72,8 +72,8 @@ def invert_time(c: Array, at: Array, step: Step, tau: float, high: float, total:
     """The s / unit in [0, high] at which the time since the begin of a step is tau; `total` is the time at high.
 
     dt = 2 G ds with G = w_l w_r of the sides in contact. Halley's iteration with bisection: its error is cubed each
-    time, or squared where u' is little more than rounding, so a correction of 1e-8 is the last one needed. It starts
-    from the parabola through both ends. `at` (2 LANES,) is scratch.
+    time, or squared where u' is little more than rounding, so LAST_CORRECTION tells the last one. It starts from the
+    parabola through both ends. `at` (2 LANES,) is scratch.
     """
     n, unit = step.order.number, step.unit
     slope = c[LANES + Lane.TIME]
@@ -98,9 +98,9 @@ def invert_time(c: Array, at: Array, step: Step, tau: float, high: float, total:
         following = s - newton / (1.0 - bend)
         if not low <= following <= high:
             following = 0.5 * (low + high)
-        elif abs(following - s) <= 1e-8 * s and abs(bend) <= 1e-8:
+        elif abs(following - s) <= LAST_CORRECTION * s and abs(bend) <= LAST_CORRECTION:
             return following
-        if high - low <= 2.0 * EPS * high:
+        if high - low <= BRACKET * high:
             return following
         s = following
     return s

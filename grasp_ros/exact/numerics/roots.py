@@ -6,11 +6,11 @@ import math
 
 from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.exact.records import Array, Integers
+from grasp_ros.exact.tolerances import AT_ONCE, BRACKET, DIED_OUT, LAST_OF_RISE
 from grasp_ros.physics.layout import EPS, Work
 
 MAX_STEPS, MAX_SHIFTS = 100, 1000
 FOUND = -1.0  # instead of a noise
-SMALL, LARGE = 1e-150, 1e150
 
 
 @kernel
@@ -22,7 +22,7 @@ def safe_step(g: float, g_rate: float, curvature: float) -> float:
     if curvature <= 0.0:
         return -g / g_rate if g_rate > 0.0 else math.inf
     root = math.sqrt(g_rate * g_rate - 2.0 * curvature * g)
-    if not SMALL < root < LARGE:  # squares have left the range of numbers
+    if not DIED_OUT < root < 1.0 / DIED_OUT:  # squares have left the range of numbers
         root = math.hypot(g_rate, math.sqrt(2.0 * curvature) * math.sqrt(-g))
     return (root - g_rate) / curvature if g_rate <= 0.0 else -2.0 * g / (root + g_rate)
 
@@ -53,8 +53,8 @@ def curvature_bound(f: Array, n: int, r: float) -> float:
 def root_of_rise(f: Array, n: int, low: float, high: float, noise: float, work: Integers) -> float:
     """The root of a polynomial that increases in [low, high] and is negative at low; inf if there is none.
 
-    Newton with bisection, from the upper end. Its error is squared by each iteration, so a correction of 1e-9 is
-    the last one needed.
+    Newton with bisection, from the upper end. Its error is squared by each iteration, so LAST_OF_RISE tells the last
+    correction.
     """
     value, rate, size = value_and_rate(f, n, high)
     if value <= 0.0:
@@ -64,9 +64,9 @@ def root_of_rise(f: Array, n: int, low: float, high: float, noise: float, work: 
         following = s - value / rate if rate > 0.0 else low
         if not low <= following <= high:
             following = 0.5 * (low + high)
-        elif abs(following - s) <= 1e-9 * s:
+        elif abs(following - s) <= LAST_OF_RISE * s:
             return following
-        if high - low <= 2.0 * EPS * high:
+        if high - low <= BRACKET * high:
             return following
         s = following
         work[Work.ROOT_ITERATIONS] += 1
@@ -102,7 +102,7 @@ def first_rise(f: Array, n: int, h: float, noise: float, work: Integers) -> floa
         for k in range(n + 1):
             f[k] = f[k + 2]
     if (n < degree and f[0] > 0.0) or (n > 0 and f[0] > noise and f[1] > 0.0):
-        return EPS * EPS * h
+        return AT_ONCE * h
     begin, last = 0.0, 0.0
     for _ in range(MAX_SHIFTS):
         s, noise, last = search(f, n, h, noise, last, work)
@@ -135,7 +135,7 @@ def search(f: Array, n: int, h: float, noise: float, last: float, work: Integers
             step = min(reach, safe_step(min(value, -near), rate, nearby))
         last = max(step, EPS * s)
         if last == 0.0:
-            last = EPS * EPS * h
+            last = AT_ONCE * h
         s += last
         if not s <= h:
             return math.inf if s > h else math.nan, FOUND, last

@@ -16,6 +16,7 @@ import numpy as np
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.graph.bag.recorder import WRITTEN
 from grasp_ros.graph.bag.recording import Recording, check_recording
+from grasp_ros.physics.control import is_due
 from grasp_ros.physics.energy import energy, energy_balance
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Contact, impact_force, penetration
@@ -117,11 +118,13 @@ def answers_of(recording: Recording) -> dict[str, Answers]:
             found[side] = Answers(recording.counts[topic.name], None, 0, topic.name)
             continue
         body, equal = SIDES[side], 0
+        forces = recording.command[:, body].tolist()
+        before = [*forces[:1], *forces[:-1]]  # whether the first one is held is not known in the bag of a late monitor
         for scene, rows in recording.parts:
             law, states = scene.system.laws[body], recording.state[rows, COLUMN[body] :][:, :2]
-            given = zip(recording.scene_tick[rows].tolist(), states.tolist(), recording.command[rows, body].tolist(),
-                        strict=True)
-            equal += sum(bool(law.command(tick, x, v) == force) for tick, (x, v), force in given)
+            given = zip(recording.scene_tick[rows].tolist(), states.tolist(), before[rows], forces[rows], strict=True)
+            equal += sum(bool((law.command(tick, x, v) if is_due(law.row, tick) else last) == force)
+                         for tick, (x, v), last, force in given)
         there = int(np.count_nonzero(~np.isnan(recording.command[:, body])))
         found[side] = Answers(there, equal, recording.unheard.get(CHANGES[side].name, 0), topic.name)
     return found

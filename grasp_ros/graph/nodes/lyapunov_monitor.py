@@ -12,6 +12,7 @@ from sensor_msgs.msg import JointState
 from grasp_ros.graph.lockstep.synchronizer import Tick
 from grasp_ros.graph.ros.messages import to_ns
 from grasp_ros.graph.serialization import raw_force
+from grasp_ros.physics.control import is_due
 from grasp_ros.physics.energy import energy, energy_balance
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
@@ -32,6 +33,7 @@ class LyapunovMonitor:
         self._scene = scene
         # What each controller has announced of its law: time in ns from which it acts, numbers, the message as it came.
         self._waiting: dict[str, deque[tuple[int, dict[str, float], bytes]]] = {side: deque() for side in SIDES}
+        self._held: dict[int, float] = {}  # last commands in N, by side
         self._acting: dict[str, int] = {}  # time in ns of the last announcement that acts, where one is known
         self._numbers = {side: Numbers(late=True) for side in SIDES}
         self.lost = 0  # announcements that never came
@@ -104,7 +106,7 @@ class LyapunovMonitor:
         work, residual, alarm = self._balance(times, states, inputs, external)
         alone = energy(system, states, external, feedback=False)
         known = not self.unknown
-        closed = np.array([known and self._explains(tick) for tick in ticks])
+        closed = np.array([self._explains(tick) and known for tick in ticks])
         V = np.full((3, len(ticks)), np.nan)
         if closed.any():
             V[:, closed] = [part[closed] for part in energy(system, states, external)[:3]]
@@ -135,6 +137,11 @@ class LyapunovMonitor:
                 continue
             body, force = SIDES[side], raw_force(tick.found[topic])
             law = self._scene.system.laws[body]
+            before, self._held[body] = self._held.get(body, force), force
+            if not is_due(law.row, tick.time_ns // self._scene.period_ns):
+                if force != before:
+                    return False
+                continue
             x, v = tick.state.numbers[COLUMN[body] :][:2]
             expected = law.command(tick.time_ns // self._scene.period_ns, x, v)
             if force != expected:

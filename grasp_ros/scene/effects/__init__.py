@@ -4,11 +4,23 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects import bodies, contact, feedback, force, friction, loop, saturation, sensing, tilt, time
+from grasp_ros.scene.effects import (
+    bodies,
+    contact,
+    feedback,
+    force,
+    friction,
+    loop,
+    rate,
+    saturation,
+    sensing,
+    tilt,
+    time,
+)
 from grasp_ros.scene.effects.base import Effect
 
 # In the order of the topics in a bag, in which effects build the system, too.
-FILES = (time, bodies, feedback, contact, loop, sensing, saturation, friction, tilt, force)
+FILES = (time, bodies, feedback, contact, loop, rate, sensing, saturation, friction, tilt, force)
 EFFECTS: tuple[Effect, ...] = tuple(effect for file in FILES for effect in file.EFFECTS)
 BY_SECTION = {effect.section: effect for effect in EFFECTS}
 PAPER = frozenset(  # the sections of the paper's grasp

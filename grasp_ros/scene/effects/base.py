@@ -90,11 +90,12 @@ class Parameter(NamedTuple):
     def holds(self, values: Any) -> Any:
         """Whether a number, or each of some in an array, is in the range; NaN is in none."""
         within = (self.low < values if self.open_low else self.low <= values) & (values <= self.high)
+        if self.whole:  # 7.0 is whole: messages carry nothing else
+            within = within & (values % 1 == 0)
         return within & ((values == 0.0) | (abs(values) >= self.smallest)) if self.has_smallest else within
 
     def _accepts_one(self, value: int | float | None) -> bool:
-        # 7.0 is whole: messages carry nothing else
-        return value is not None and not (self.whole and value != value // 1) and bool(self.holds(value))
+        return value is not None and bool(self.holds(value))
 
 
 class Output(NamedTuple):
@@ -102,6 +103,14 @@ class Output(NamedTuple):
 
     topic: Topic
     value: Callable[[System, int, Array], float]  # system, tick, state (6,) to N
+
+
+class Relation(NamedTuple):
+    """What numbers of a scene must obey together, each of which is in its range."""
+
+    text: str  # for the page of the domain
+    why: str
+    problems: Callable[[Sections], Iterable[str]]  # how a scene breaks it, see `problem`
 
 
 def problem(key: str, value: object, allowed: str) -> str:
@@ -133,7 +142,7 @@ class Effect:
     node: str = "plant"  # the executable that declares its parameters
     commands: Topic | None = None  # topic of the controller that it brings
     outputs: tuple[Output, ...] = ()  # what the plant publishes about it
-    problems: Callable[[Sections], Iterable[str]] = nothing  # what is wrong beyond ranges
+    relations: tuple[Relation, ...] = ()  # what its numbers must obey beyond their ranges
     oddities: Callable[[Sections, System], Iterable[str]] = nothing  # suspicious settings
     acts_by: tuple[str, ...] = ()  # keys of numbers without which, or where all are 0, it does nothing
     example: Numbers = field(default_factory=dict)  # keys to add to a scene to see what it does; none: the paper has it

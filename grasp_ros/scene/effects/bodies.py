@@ -7,7 +7,7 @@ from functools import partial
 
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import OBJECT, Of
-from grasp_ros.scene.effects.base import SIDES, Effect, Parameter, Sections, nothing, problem
+from grasp_ros.scene.effects.base import SIDES, Effect, Parameter, Relation, Sections, nothing, problem
 
 MASS_KG = Parameter("mass_kg", *RANGES["mass"].bounds, "mass", place=("bodies", Of.MASS))
 MOTION = (
@@ -19,17 +19,19 @@ SPRING = Parameter("stiffness_N_per_m", *RANGES["stiffness of an arm"].bounds, "
                    place=("bodies", Of.STIFFNESS))
 DAMPER = Parameter("damping_Ns_per_m", *RANGES["damping, drag"].bounds, "damper of the arm, c", optional=True,
                    place=("bodies", Of.DAMPING))
+SUMS = {"stiffness_N_per_m": "position_gain_N_per_m", "damping_Ns_per_m": "velocity_gain_Ns_per_m"}
 
 
-def _negative_sums(side: str, sections: Sections) -> Iterable[str]:
-    arm, gains = sections[f"{side}_arm"], sections.get(f"{side}_feedback", {})
-    for own, gain in (
-        ("stiffness_N_per_m", "position_gain_N_per_m"),
-        ("damping_Ns_per_m", "velocity_gain_Ns_per_m"),
-    ):
-        total = arm.get(own, 0.0) + gains.get(gain, 0.0)
-        if total < 0.0:
-            yield problem(f"{side}_arm, {side}_feedback: {own} + {gain}", total, "a sum >= 0")
+def _negative_sum(side: str, own: str, gain: str, sections: Sections) -> Iterable[str]:
+    total = sections[f"{side}_arm"].get(own, 0.0) + sections.get(f"{side}_feedback", {}).get(gain, 0.0)
+    if total < 0.0:
+        yield problem(f"{side}_arm, {side}_feedback: {own} + {gain}", total, "a sum >= 0")
+
+
+def _relations(side: str) -> Iterable[Relation]:
+    why = "a negative one drives an arm away, or adds energy"
+    for own, gain in SUMS.items():
+        yield Relation(f"`{own}` + `{gain}` of its feedback >= 0", why, partial(_negative_sum, side, own, gain))
 
 
 EFFECTS = (
@@ -37,7 +39,7 @@ EFFECTS = (
         Effect(
             f"{side}_arm", f"{side} arm: a mass, with a spring and a damper to the ground where they are named",
             (MASS_KG, SPRING, DAMPER, *MOTION), nothing, "m x'^2 + k x^2; the damper takes 2 c x'^2", row=body,
-            problems=partial(_negative_sums, side),
+            relations=tuple(_relations(side)),
         )
         for side, body in SIDES.items()
     ),

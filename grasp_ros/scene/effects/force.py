@@ -6,7 +6,7 @@ Because a force changes at ticks only, the motion between them stays exact, and 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import pairwise
 
@@ -16,7 +16,17 @@ from numpy.typing import NDArray
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import ExternalForce, System
-from grasp_ros.scene.effects.base import BODIES, NANOSECONDS, Effect, Output, Parameter, Sections, oddity, problem
+from grasp_ros.scene.effects.base import (
+    BODIES,
+    NANOSECONDS,
+    Effect,
+    Output,
+    Parameter,
+    Relation,
+    Sections,
+    oddity,
+    problem,
+)
 from grasp_ros.scene.effects.time import nanoseconds, period_ns
 from grasp_ros.scene.topics import EXTERNAL_FORCES
 
@@ -70,7 +80,6 @@ def _build_sine(section: str, body: int, sections: Sections, system: System) -> 
 
 
 def _off_tick(keys: tuple[str, ...], section: str, sections: Sections) -> Iterable[str]:
-    """Times must be whole control periods."""
     period = period_ns(sections)
     for key in keys:
         value = sections[section][key]
@@ -81,17 +90,19 @@ def _off_tick(keys: tuple[str, ...], section: str, sections: Sections) -> Iterab
             yield problem(f"{section}.{key}", off, f"whole control periods of {period / NANOSECONDS!r} s")
 
 
-def _table_problems(section: str, sections: Sections) -> Iterable[str]:
-    yield from _off_tick(("time_s",), section, sections)
-    times, forces = sections[section]["time_s"], sections[section]["force_N"]
+def _unsorted(section: str, sections: Sections) -> Iterable[str]:
+    times = sections[section]["time_s"]
     if any(later <= earlier for earlier, later in pairwise(times)):
         yield problem(f"{section}.time_s", times, "ascending times")
+
+
+def _unpaired(section: str, sections: Sections) -> Iterable[str]:
+    times, forces = sections[section]["time_s"], sections[section]["force_N"]
     if len(times) != len(forces):
         yield problem(f"{section}.force_N", forces, f"as many forces as times, {len(times)}")
 
 
-def _sine_problems(section: str, sections: Sections) -> Iterable[str]:
-    """A staircase of one step per control period shows faster sines as slower ones."""
+def _too_fast(section: str, sections: Sections) -> Iterable[str]:
     frequency, highest = sections[section]["frequency_Hz"], 0.5 * NANOSECONDS / period_ns(sections)
     if frequency > highest:
         allowed = f"at most {highest!r} Hz, half a turn per control period of time.control_period_s"
@@ -119,21 +130,38 @@ def _odd_table(section: str, sections: Sections, _: System) -> Iterable[str]:
         yield oddity(key, idle[0], "is not before the run's end: its force never acts", f"a last time {meant}")
 
 
+TICKS = "an external force changes at ticks only"
+# By kind of force: what, why, and what is wrong in a section.
+RELATIONS: dict[str, tuple[tuple[str, str, Callable[[str, Sections], Iterable[str]]], ...]] = {
+    "pulse": (
+        ("`start_s` and `length_s` are whole control periods", TICKS, partial(_off_tick, ("start_s", "length_s"))),
+    ),
+    "sine": (
+        ("`frequency_Hz` is at most half a turn per control period",
+         "with one value per control period, a faster sine is the same as a slower one", _too_fast),
+    ),
+    "table": (
+        ("all of `time_s` are whole control periods", TICKS, partial(_off_tick, ("time_s",))),
+        ("`time_s` is ascending", "each force acts until the next time", _unsorted),
+        ("`force_N` has as many entries as `time_s`", "each time has its force", _unpaired),
+    ),
+}
+
+
 def _effects(name: str, body: int) -> Iterable[Effect]:
     outputs = (Output(EXTERNAL_FORCES[name], lambda system, tick, _: float(system.external_at(tick)[body])),)
     work = "the force does work: V_c rises by at most twice its work"
-    for kind, parameters, size, build, problems, odd, example in (
-        ("pulse", PULSE, "force_N", _build_steps, partial(_off_tick, ("start_s", "length_s")),
-         _odd_pulse, {"force_N": 2.0, "start_s": 0.5, "length_s": 0.1}),
-        ("sine", SINE, "amplitude_N", _build_sine, _sine_problems, lambda *_: (),
-         {"amplitude_N": 1.0, "frequency_Hz": 2.0}),
-        ("table", TABLE, "force_N", _build_steps, _table_problems, _odd_table,
+    for kind, parameters, size, build, odd, example in (
+        ("pulse", PULSE, "force_N", _build_steps, _odd_pulse, {"force_N": 2.0, "start_s": 0.5, "length_s": 0.1}),
+        ("sine", SINE, "amplitude_N", _build_sine, lambda *_: (), {"amplitude_N": 1.0, "frequency_Hz": 2.0}),
+        ("table", TABLE, "force_N", _build_steps, _odd_table,
          {"time_s": [0.25, 0.5, 0.75], "force_N": [1.0, -1.0, 0.0]}),
     ):
         section = f"{name}_{kind}"
         yield Effect(
             section, f"external force on the {name.replace('_', ' ')}: a {kind}", parameters,
-            partial(build, section, body), work, needs=(name,), outputs=outputs, problems=partial(problems, section),
+            partial(build, section, body), work, needs=(name,), outputs=outputs, relations=tuple(
+                Relation(text, why, partial(problems, section)) for text, why, problems in RELATIONS[kind]),
             oddities=partial(odd, section), acts_by=(size,), example=example,
         )
 

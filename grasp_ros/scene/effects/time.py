@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from grasp_ros.physics.domain import RANGES
-from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Parameter, Sections, nothing, problem
+from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Parameter, Relation, Sections, nothing, problem
 
 
 def nanoseconds(seconds: float) -> int:
@@ -18,12 +18,15 @@ def period_ns(sections: Sections) -> int:
     return nanoseconds(sections["time"]["control_period_s"])
 
 
-def _problems(sections: Sections) -> Iterable[str]:
-    numbers = sections["time"]
+def _fractions(sections: Sections) -> Iterable[str]:
     for key in ("control_period_s", "duration_s"):
-        if nanoseconds(numbers[key]) / NANOSECONDS != numbers[key]:
-            yield problem(f"time.{key}", numbers[key], "whole nanoseconds")
-            return
+        seconds = sections["time"][key]
+        if nanoseconds(seconds) / NANOSECONDS != seconds:
+            yield problem(f"time.{key}", seconds, "whole nanoseconds")
+
+
+def _rest_of_period(sections: Sections) -> Iterable[str]:
+    numbers = sections["time"]
     if nanoseconds(numbers["duration_s"]) % period_ns(sections):
         allowed = f"a whole number of control periods of {numbers['control_period_s']!r} s"
         yield problem("time.duration_s", numbers["duration_s"], allowed)
@@ -38,6 +41,10 @@ EFFECTS = (
                       "how long a command is held if the feedback is sampled, and an external force stays the same",
                       open_low=True),
         ),
-        nothing, "none", problems=_problems,
+        nothing, "none",
+        relations=(
+            Relation("both times are whole nanoseconds", "as in the stamps of messages", _fractions),
+            Relation("`duration_s` is a whole number of control periods", "a run ends at a tick", _rest_of_period),
+        ),
     ),
 )
