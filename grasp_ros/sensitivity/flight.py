@@ -172,8 +172,19 @@ def drive_at_rest(t: Tangents, body: Body, j: int) -> float:
 
 
 @kernel
+def write_drift_at_rest(t: Tangents) -> None:
+    """Write what accelerates the tangents by itself makes of them in a time at rest, whose flow is there."""
+    integral = t.matrices[2]
+    for j in range(t.x.shape[1]):
+        left, right = drive_at_rest(t, LEFT, j), drive_at_rest(t, RIGHT, j)
+        middle = drive_at_rest(t, OBJECT, j)
+        for i in range(STATES):
+            t.drift[i, j] = integral[i, V.L] * left + integral[i, V.O] * middle + integral[i, V.R] * right
+
+
+@kernel
 def write_flow_at_rest(t: Tangents, span: float) -> None:
-    """Write the flow of `span` s at rest and its integral to the second and third of `matrices`."""
+    """Write the flow of `span` s at rest and its integral to the second and third of `matrices`, and the drift."""
     a, flow, integral, term, spare = t.matrices[0], t.matrices[1], t.matrices[2], t.matrices[3], t.matrices[4]
     times = halvings(rate_at_rest(t, a), span)
     h = span * power_of_two(-times)
@@ -195,18 +206,16 @@ def write_flow_at_rest(t: Tangents, span: float) -> None:
                 integral[i, j] += spare[i, j]
         product_6x6(flow, flow, spare)
         copy_matrix(flow, spare)
+    write_drift_at_rest(t)
 
 
 @kernel
 def rest_tangent(t: Tangents) -> None:
-    """Write the tangents after a time at rest, whose flow is there, to `at`."""
-    flow, integral = t.matrices[1], t.matrices[2]
-    for j in range(t.x.shape[1]):
-        left, right = drive_at_rest(t, LEFT, j), drive_at_rest(t, RIGHT, j)
-        middle = drive_at_rest(t, OBJECT, j)
+    """Write the tangents after a time at rest, whose flow and drift are there, to `at`."""
+    flow = t.matrices[1]
+    for first in range(0, t.x.shape[1], HALF):
         for i in range(STATES):
-            total = integral[i, V.L] * left + integral[i, V.O] * middle + integral[i, V.R] * right
+            total = load_half(t.drift[i], first)
             for k in range(STATES):
-                total += flow[i, k] * t.x[k, j]
-            t.at[i, j] = total
-
+                total = total + flow[i, k] * load_half(t.x[k], first)
+            store(t.at[i], first, total)

@@ -14,13 +14,14 @@ import math
 
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import door, kernel
+from grasp_ros.exact.compilation.vectors import load, store
 from grasp_ros.exact.driver.callback import FINISH, REST
 from grasp_ros.exact.driver.intervals import feedback, is_due, measured
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, surface_factor
 from grasp_ros.exact.numerics.polynomial import invert_time
-from grasp_ros.exact.numerics.roots import shift, value_and_rate
-from grasp_ros.exact.records import Order, Step
+from grasp_ros.exact.numerics.roots import value_and_rate
+from grasp_ros.exact.records import Array, Order, Step
 from grasp_ros.exact.tolerances import SURFACE
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, Slide, U, V, X
@@ -193,6 +194,16 @@ def fly_free(t: Tangents, presses: bool, tau: float) -> None:
 
 
 @kernel
+def shift_table(c: Array, n: int, s: float) -> None:
+    """Expand a Taylor table of degree n about s instead of 0, all lanes at a time, see `roots.shift`."""
+    for first in range(n):
+        above = load(c, LANES * n)
+        for i in range(LANES * (n - 1), LANES * (first - 1), -LANES):
+            above = load(c, i) + s * above
+            store(c, i, above)
+
+
+@kernel
 def pass_step(t: Tangents, begin: float, span: float, s: float, unit: float, n: int) -> None:
     """Move the tangents over a Taylor step, in parts where their series end later than those of the run."""
     step = Step(Order(n, 0.0, 0), unit, touches(t, LEFT), touches(t, RIGHT))
@@ -214,8 +225,7 @@ def pass_step(t: Tangents, begin: float, span: float, s: float, unit: float, n: 
         copy_matrix(t.at, t.x)  # what flies stays at the begin
         step_tangents(t, n, part)
         copy_matrix(t.x, t.at)
-        for lane in range(LANES):
-            shift(t.c[lane::LANES], n, part)
+        shift_table(t.c, n, part)
         s -= part
 
 

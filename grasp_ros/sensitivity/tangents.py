@@ -140,6 +140,7 @@ class Tangents(NamedTuple):
     factors: Array  # (2, ROOM)
     products: Array  # (3, ROOM) see `contact.pair_series`
     matrices: Array  # (5, 6, 6)
+    drift: Array  # (6, N) of the tangents at rest, by what acts on the bodies
     flows: Array  # (FLOWS,) see `flight.Flow`
 
 
@@ -166,7 +167,7 @@ def tangents_of(plant: Plant, state: State, changes: Directions, times: Array, e
         np.zeros((2, 1, 2)), np.zeros((2, n)), np.zeros((0, 2, n)), changes.external,
         counts, numbers, times[order], order, np.zeros((m, STATES, n)), np.zeros((e, 3, 2 + n)),
         zeros(wide // HALF * BLOCK), np.zeros((ROWS, TERMS)), zeros(5 * WEIGHTS), zeros(2, ROOM), zeros(3, ROOM),
-        np.zeros((5, STATES, STATES)), zeros(FLOWS))
+        np.zeros((5, STATES, STATES)), zeros(STATES, wide), zeros(FLOWS))
 
 
 tangents_at = reader(typeof(tangents_of(*new_run()[2:], no_directions(1), np.zeros(0), 0)))
