@@ -3,7 +3,9 @@
 Settling times jump from swing to swing, and the best choice often lies beside such a jump, where no derivative points
 to it. So it is sought by what needs none, differential evolution (R. Storn and K. Price, J. Global Optim. 11, 1997):
 each generation is one ensemble. It begins with the best of a sample, as an outcome may exist in a small part of the
-ranges only.
+ranges only. Of ten starts of SLSQP, with central differences as derivatives, none ended within 1e-6 of the two gains of
+case 1 that settle fastest under a bound on the inputs; at a smallest peak of the impacts, which is smooth, all ten did,
+each with a fiftieth of the runs.
 """
 
 from __future__ import annotations

@@ -114,7 +114,9 @@ def _difference(scene: Scene, key: str, parameter: Parameter, ticks: int) -> Ite
     value = scene.values[section][name]
 
     def at(other: float) -> tuple[Array, ...]:  # which need not be in its range
-        system = build({**scene.values, section: {**scene.values[section], name: other}})
+        return arrays(build({**scene.values, section: {**scene.values[section], name: other}}))
+
+    def arrays(system: System) -> tuple[Array, ...]:
         external = system.external_over(np.arange(ticks)) if ticks else np.zeros((0, 3))
         return (system.bodies, system.pairs, system.state, np.array([system.coulomb]),
                 np.minimum(system.law_rows, LARGEST), external)
@@ -123,7 +125,7 @@ def _difference(scene: Scene, key: str, parameter: Parameter, ticks: int) -> Ite
         low, high, width = at(value - 0.5 * math.pi), at(value + 0.5 * math.pi), 2.0
     else:
         width = float(value) or 1.0
-        low, high = at(value), at(value + width)
+        low, high = arrays(scene.system), at(value + width)
     return ((b - a) / width for a, b in zip(low, high, strict=True))
 
 
