@@ -27,7 +27,7 @@ from grasp_ros.scene.effects.base import (
     oddity,
     problem,
 )
-from grasp_ros.scene.effects.time import nanoseconds, period_ns
+from grasp_ros.scene.effects.time import is_tick, nanoseconds, period_ns
 from grasp_ros.scene.topics import EXTERNAL_FORCES
 
 PULSE = (
@@ -80,14 +80,13 @@ def _build_sine(section: str, body: int, sections: Sections, system: System) -> 
 
 
 def _off_tick(keys: tuple[str, ...], section: str, sections: Sections) -> Iterable[str]:
-    period = period_ns(sections)
     for key in keys:
         value = sections[section][key]
         times = value if isinstance(value, tuple) else (value,)
-        off = next((time for time in times if nanoseconds(time) / NANOSECONDS != time or nanoseconds(time) % period),
-                   None)
+        off = next((time for time in times if not is_tick(time, sections)), None)
         if off is not None:
-            yield problem(f"{section}.{key}", off, f"whole control periods of {period / NANOSECONDS!r} s")
+            period = sections["time"]["control_period_s"]
+            yield problem(f"{section}.{key}", off, f"whole control periods of {period!r} s")
 
 
 def _unsorted(section: str, sections: Sections) -> Iterable[str]:

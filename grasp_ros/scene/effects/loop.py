@@ -9,8 +9,8 @@ from grasp_ros.physics.control import Column
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.sampled import spectral_radius
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import NANOSECONDS, SIDES, Effect, Parameter, Relation, Sections, oddity, problem
-from grasp_ros.scene.effects.time import nanoseconds, period_ns
+from grasp_ros.scene.effects.base import SIDES, Effect, Parameter, Relation, Sections, oddity, problem
+from grasp_ros.scene.effects.time import is_tick, nanoseconds, period_ns, ticks_of
 
 HELD = "commands are held over control periods and do work of their own"
 FAR = 6.0  # decades that a motion may grow in a run: studies of the limit of stability need fewer
@@ -32,8 +32,7 @@ def _both(sections: Sections) -> Iterable[str]:
 
 def _off_tick(sections: Sections) -> Iterable[str]:
     seconds = sections["loop"].get("delay_s", 0.0)
-    whole = nanoseconds(seconds) / NANOSECONDS == seconds and nanoseconds(seconds) % period_ns(sections) == 0
-    if not whole or _delay(sections) > LONGEST:
+    if not is_tick(seconds, sections) or _delay(sections) > LONGEST:
         period = sections["time"]["control_period_s"]
         allowed = f"a whole number of control periods of {period!r} s, at most {LONGEST}"
         yield problem("loop.delay_s", seconds, allowed)
@@ -49,7 +48,7 @@ def _build(sections: Sections, system: System) -> None:
 
 
 def _odd(sections: Sections, system: System) -> Iterable[str]:
-    numbers, ticks = sections["loop"], nanoseconds(sections["time"]["duration_s"]) // period_ns(sections)
+    numbers, ticks = sections["loop"], ticks_of(sections)
     if not system.laws:
         yield oddity("loop", numbers, "holds no command: no side has feedback", "left_feedback or right_feedback too")
     if ticks == 1:

@@ -8,7 +8,7 @@ from functools import partial
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import SIDES, Effect, Parameter, Sections, oddity
-from grasp_ros.scene.effects.time import nanoseconds, period_ns
+from grasp_ros.scene.effects.time import ticks_of
 
 PARAMETERS = (
     Parameter("period_ticks", 1, 1_000_000, "control periods from an answer of the controller to its next one",
@@ -23,7 +23,7 @@ def _build(side: str, sections: Sections, system: System) -> None:
 
 def _odd(side: str, sections: Sections, _: System) -> Iterable[str]:
     key, period = f"{side}_rate.period_ticks", sections[f"{side}_rate"]["period_ticks"]
-    ticks = nanoseconds(sections["time"]["duration_s"]) // period_ns(sections)
+    ticks = ticks_of(sections)
     if period == 1:
         yield oddity(key, 1, "has no effect", "2 or more, or no such section")
     if period >= ticks > 1:

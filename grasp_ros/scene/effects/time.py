@@ -18,6 +18,17 @@ def period_ns(sections: Sections) -> int:
     return nanoseconds(sections["time"]["control_period_s"])
 
 
+def ticks_of(sections: Sections) -> int:
+    """Control periods of a run."""
+    return nanoseconds(sections["time"]["duration_s"]) // period_ns(sections)
+
+
+def is_tick(seconds: float, sections: Sections) -> bool:
+    """Whether a time is a whole number of control periods, in whole nanoseconds."""
+    time = nanoseconds(seconds)
+    return time / NANOSECONDS == seconds and time % period_ns(sections) == 0
+
+
 def _fractions(sections: Sections) -> Iterable[str]:
     for key in ("control_period_s", "duration_s"):
         seconds = sections["time"][key]
