@@ -1,7 +1,7 @@
 """Regression scenes: each failed a check once; what is right by the reference, and how far the product is from it.
 
-`lab/cases/regression` holds the scenes and the answers to those whose motion can be compared, `lab/cases/outside` those
-that the domain excludes.
+`lab/cases/regression` holds the scenes and the answers: the motion of those that can be compared, and by which rule of
+the domain others are refused.
 `python -m lab.cases.regression NAME ...` writes the answers to some of them.
 """
 
@@ -31,7 +31,6 @@ from lab.oracles.rounding_bounds import largest, rates
 from lab.reference import integrate
 
 SCENES = Path(__file__).with_name("regression")
-OUTSIDE = SCENES.with_name("outside")
 ANSWERS = SCENES / "answers.json"
 DIGITS = 25
 STEPS = 2_500  # of the reference; where it needs more the answer ends earlier
@@ -61,8 +60,8 @@ class Verdict(NamedTuple):
 
 
 def names() -> list[str]:
-    """Names of all scenes."""
-    return sorted(path.stem for path in SCENES.glob("*.yaml"))
+    """Names of all scenes inside the domain."""
+    return sorted({path.stem for path in SCENES.glob("*.yaml")} - refused().keys())
 
 
 def load(name: str) -> Scene:
@@ -70,12 +69,17 @@ def load(name: str) -> Scene:
     return scenes.load(str(SCENES / f"{name}.yaml"))
 
 
+def refused() -> dict[str, str]:
+    """Scenes outside the domain, and how they are refused: what the key ends with, and the rule or what is allowed."""
+    return {name: fields["refused"] for name, fields in _known().items() if "refused" in fields}
+
+
 def refusals() -> Counter[tuple[str, str]]:
-    """How many scenes of OUTSIDE each rule of the domain refuses, by its ratio or its key, and what is allowed."""
+    """How many scenes each rule of the domain refuses, by its ratio or its key, and what is allowed."""
     found: Counter[tuple[str, str]] = Counter()
-    for path in sorted(OUTSIDE.glob("*.yaml")):
+    for name in refused():
         try:
-            scenes.load(str(path))
+            load(name)
         except SceneError as refusal:
             _, key, sentence = str(refusal).split(": ", 2)
             rule = next((rule.text for rule in RULES if rule.text in sentence), f"`{key.partition('.')[2]}`")
@@ -84,8 +88,13 @@ def refusals() -> Counter[tuple[str, str]]:
 
 
 def answers() -> dict[str, Answer]:
-    """All answers by the name of their scene."""
-    return {name: Answer(**fields) for name, fields in json.loads(ANSWERS.read_text(encoding="utf-8")).items()}
+    """The motions that can be compared, by the name of their scene."""
+    return {name: Answer(**fields) for name, fields in _known().items() if "t" in fields}
+
+
+def _known() -> dict[str, dict[str, Any]]:
+    found: dict[str, dict[str, Any]] = json.loads(ANSWERS.read_text(encoding="utf-8"))
+    return found
 
 
 def answer(scene: Scene) -> Answer:
@@ -188,8 +197,8 @@ def main(chosen: Sequence[str]) -> int:
     """Write the answers to some scenes; the others stay."""
     for name in chosen:
         right = answer(load(name))
-        found = {**answers(), name: right}
-        text = {known: found[known]._asdict() for known in sorted(found)}
+        found = {**_known(), name: right._asdict()}
+        text = {known: found[known] for known in sorted(found)}
         ANSWERS.write_text(json.dumps(text, indent=1) + "\n", encoding="utf-8")
         sys.stderr.write(f"{name}: until {right.t[-1]:g} s\n")
     return 0

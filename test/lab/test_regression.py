@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from grasp_ros.physics.layout import Work
-from grasp_ros.scene import compose
+from grasp_ros.scene import SceneError, compose
 from grasp_ros.simulation import simulate
-from lab.cases.regression import answer, answers, load, names, verdict
+from lab.cases.regression import SCENES, answer, answers, load, names, refusals, refused, verdict
 
 ANSWERS = answers()
 FEW, MORE = 10.0, 100.0  # roundings
@@ -62,6 +62,19 @@ def test_what_moves_alike_is_told_by_what_a_step_adds() -> None:
         gained = simulate(moving, grid=[1.0]).state[-1, 1::2] - speed
         assert masses @ gained == pytest.approx(-1e-11, rel=0.02, abs=0.0)  # roundings of the speed
         assert gained[:2] == pytest.approx([-2.316e-12, -7.653e-12], rel=0.03, abs=0.0)
+
+
+@pytest.mark.parametrize(("name", "words"), refused().items())
+def test_a_scene_outside_the_domain_is_refused_by_its_rule(name: str, words: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        load(name)
+    sentence = str(caught.value)
+    assert sentence.startswith(f"{SCENES / name}.yaml: ")
+    assert all(part in sentence for part in [*words.split(": "), "allowed: "])
+
+
+def test_each_refusal_is_counted_once() -> None:
+    assert refusals().total() == len(refused())
 
 
 def test_answers_belong_to_scenes() -> None:
