@@ -27,7 +27,8 @@ from lab.drills.nodes import NAME
 STRAY, ROGUE, OTHERS = "a stray message", "a controller that answers wrongly", "others in the same domain"
 CODE = "!!python/object/apply:os.mkdir ['owned']"
 NAMES_SECONDS = 2.0  # for discovery to tell the names of nodes that have just come
-INJECTOR = f"/{NAME}|a node whose name is not known yet"  # the latter as long as discovery has none
+NAMELESS = "a node whose name is not known yet"  # as long as discovery has none
+INJECTOR = f"/{NAME}|{NAMELESS}"
 MALFORMED: dict[str, Any] = {"name": ["left", "object"], "position": [0.1], "velocity": [], "effort": [1.0, 2.0, 3.0]}
 
 
@@ -111,7 +112,7 @@ def _others() -> list[Drill]:
     other = ("-p", "left_feedback.position_gain_N_per_m:=9.0", "-r", "__node:=other")
     return [
         Drill("second-controller", OTHERS, "a second left controller, with another gain", Stage.run,
-              partial(_second, name="left_controller", topic=LEFT_COMMAND, words=other), culprit="/other"),
+              partial(_second, name="left_controller", topic=LEFT_COMMAND, words=other), culprit=f"/other|{NAMELESS}"),
         Drill("second-plant", OTHERS, "a second plant", Stage.run, partial(_second, name="plant", topic=JOINT_STATES),
               by_itself=True),
         Drill("second-run", OTHERS, "a second `grasp run`", Stage.run, _second_run, by_itself=True,
