@@ -26,7 +26,7 @@ from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.impact import energy_quotient
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.contract import Problem, Solution
-from grasp_ros.methods.equations import SLIVER, Work, parameters
+from grasp_ros.methods.equations import SLIVER, Work, in_pieces, parameters
 from grasp_ros.physics.layout import EPS, Outcome
 
 MOST_ITERATIONS = 100
@@ -36,7 +36,8 @@ def solve(problem: Problem) -> Solution:
     """Integrate with a fixed step; outputs between the steps by the parabola that the method follows."""
     q, y = parameters(problem.system), tuple(problem.system.state.tolist())
     out, work = np.empty((len(problem.grid), 6)), np.zeros(len(Work), dtype=np.int64)
-    outcome, rows = run(q, y, problem.duration, problem.grid, problem.setting, out, work)
+    outcome, (_, _, _, rows) = in_pieces(problem, (0.0, y, 0, 0), lambda reached, last: run(
+        q, problem.duration, problem.setting, problem.grid, out, work, reached, last))
     return Solution(out[:rows], np.empty((0, 5)), work, Status[Outcome(outcome).name])
 
 
@@ -116,13 +117,15 @@ def within(y: Any, z: Any, h: float, part: float) -> Any:
 
 
 @kernel
-def run(q: Any, y: Any, duration: float, grid: Any, step: float, out: Any, work: Any) -> Any:
-    """All steps; returns the outcome and how many rows of `out` are filled."""
-    row, number, t = 0, 0, 0.0
+def run(q: Any, duration: float, step: float, grid: Any, out: Any, work: Any, reached: Any, last: int) -> Any:
+    """The steps up to the last of a piece; returns the outcome, and the time, the state, the steps and rows done."""
+    t, y, number, row = reached
     while row < grid.shape[0] and grid[row] <= 0.0:
         out[row] = y
         row += 1
     while t < duration:
+        if number == last:
+            return Outcome.GO_ON.value, (t, y, number, row)
         number += 1
         end = min(number * step, duration)
         if duration - end < SLIVER * step:
@@ -133,9 +136,9 @@ def run(q: Any, y: Any, duration: float, grid: Any, step: float, out: Any, work:
         work[Work.STEPS] += 1
         total = z[0] + z[1] + z[2] + z[3] + z[4] + z[5]
         if not math.isfinite(total):
-            return (Outcome.STALLED if math.isnan(total) else Outcome.NOT_FINITE).value, row
+            return (Outcome.STALLED if math.isnan(total) else Outcome.NOT_FINITE).value, (t, y, number, row)
         while row < grid.shape[0] and grid[row] <= end:
             out[row] = within(y, z, h, (grid[row] - t) / (end - t))
             row += 1
         y, t = z, end
-    return Outcome.DONE.value, row
+    return Outcome.DONE.value, (t, y, number, row)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
 from typing import Any
 
@@ -9,11 +10,13 @@ import numpy as np
 
 from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.exact.impact import damping_factor, elastic_force
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of, Pair, Transition
+from grasp_ros.methods.contract import Problem
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of, Outcome, Pair, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
 
 MAX_IDLE = 100  # events without progress in time
+PIECE = 2**16  # steps: some milliseconds
 SLIVER = 1e-9  # of a step: what rounding may leave at the end of the horizon
 
 
@@ -34,6 +37,19 @@ def parameters(system: System) -> Array:
     bodies, pairs = system.closed_loop, system.pairs
     sides = [part for side in (LEFT, RIGHT) for part in (bodies[side, :Of.FORCE], pairs[side])]
     return np.concatenate([*sides, bodies[OBJECT, [Of.MASS]]])
+
+
+def in_pieces(problem: Problem, begin: Any, run: Callable[[Any, int], tuple[int, Any]]) -> tuple[int, Any]:
+    """The outcome of a run with a fixed step, and what it reached: some steps at a time, to say how far it is.
+
+    `run` goes on from what is reached, the time in s first, up to a step.
+    """
+    outcome, reached = run(begin, last := PIECE)
+    while outcome == Outcome.GO_ON:
+        if problem.progress is not None:
+            problem.progress(reached[0])
+        outcome, reached = run(reached, last := last + PIECE)
+    return outcome, reached
 
 
 @kernel

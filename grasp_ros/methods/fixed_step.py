@@ -28,7 +28,17 @@ from grasp_ros.exact.compilation.jit import allocating, kernel
 from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.contract import Problem, Solution
-from grasp_ros.methods.equations import MAX_IDLE, SLIVER, Work, condition, kind_of, parameters, rates, relative
+from grasp_ros.methods.equations import (
+    MAX_IDLE,
+    SLIVER,
+    Work,
+    condition,
+    in_pieces,
+    kind_of,
+    parameters,
+    rates,
+    relative,
+)
 from grasp_ros.physics.layout import EPS, LEFT, RIGHT, Body, Outcome, Pair
 
 PLAIN, PAPER, LOCATED = 0, 1, 2
@@ -40,7 +50,10 @@ def solve(rule: int, problem: Problem) -> Solution:
     q, y = parameters(problem.system), tuple(problem.system.state.tolist())
     out, work = np.empty((len(problem.grid), 6)), np.zeros(len(Work), dtype=np.int64)
     events = np.empty((0 if rule == PLAIN else min(problem.max_events, MOST_EVENTS), 5))
-    outcome, rows, found = run(rule, q, y, problem.duration, problem.grid, problem.setting, out, events, work)
+    mode = np.array([Pair.CONTACT if rule == PLAIN else condition(q, y, side) for side in (LEFT, RIGHT)])
+    pairs = mode, np.full(2, -1.0)
+    outcome, (_, _, _, rows, found, _) = in_pieces(problem, (0.0, y, 0, 0, 0, 0), lambda reached, last: run(
+        rule, q, problem.duration, problem.setting, problem.grid, out, events, work, pairs, reached, last))
     status = Status.EVENT_BUDGET if outcome == Outcome.EVENTS_FULL else Status[Outcome(outcome).name]
     return Solution(out[:rows], events[:found].copy(), work, status)
 
@@ -178,20 +191,23 @@ def deliver(linear: bool, y: Any, f: Any, z: Any, g: Any, t: float, reached: flo
 
 
 @allocating
-def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out: Any, events: Any, work: Any) -> Any:
-    """All steps; returns the outcome and how many rows of `out` and of `events` are filled.
+def run(rule: int, q: Any, duration: float, step: float, grid: Any, out: Any, events: Any, work: Any, pairs: Any,
+        reached: Any, last: int) -> Any:
+    """The steps up to the last of a piece; returns the outcome, and what is reached.
+
+    That is the time, the state, the steps done, how many rows of `out` and of `events` are filled, and how many events
+    have come without progress. `pairs` has the modes of the pairs, and when each has changed last.
 
     The outcome is a number: Python code makes an enum of it, and a signal that has come meanwhile raises in that code.
     """
-    row, found, number, idle, t = 0, 0, 0, 0, 0.0
-    mode, free = np.zeros(2, dtype=np.int64), np.ones(2, dtype=np.bool_)
-    changed = np.full(2, -1.0)  # time of the last event
-    for side in (LEFT, RIGHT):
-        mode[side] = Pair.CONTACT if rule == PLAIN else condition(q, y, side)
+    (t, y, number, row, found, idle), (mode, changed) = reached, pairs
+    free = np.ones(2, dtype=np.bool_)
     while row < grid.shape[0] and grid[row] <= 0.0:
         out[row] = y
         row += 1
     while t < duration:
+        if number == last:
+            return Outcome.GO_ON.value, (t, y, number, row, found, idle)
         number += 1
         end = min(number * step, duration)
         if duration - end < SLIVER * step:
@@ -201,7 +217,7 @@ def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out:
             after = condition(q, y, side) if rule == PAPER else mode[side]
             if after != mode[side] and changed[side] != t:  # one that changes here has u at a rounding of either sign
                 if found == events.shape[0]:
-                    return Outcome.EVENTS_FULL.value, row, found
+                    return Outcome.EVENTS_FULL.value, (t, y, number, row, found, idle)
                 found = change(events, found, t, side, mode, after, y)
         while t < end:
             h = end - t
@@ -211,23 +227,23 @@ def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out:
             work[Work.STEPS] += 1
             work[Work.RIGHT_HAND_SIDES] += 4
             theta, side, after = first_transition(rule, q, y, f, z, h, mode, free, work)
-            reached = end
+            until = end
             if theta <= 1.0:
                 linear = along(y, theta, along(z, -1.0, y))
                 z = linear if rule == PAPER else rk4(q, push_l, push_r, y, f, theta * h)
-                reached = min(t + theta * h, end)
-            if row < grid.shape[0] and grid[row] <= reached:
+                until = min(t + theta * h, end)
+            if row < grid.shape[0] and grid[row] <= until:
                 g = rates(q, push_l, push_r, z)
-                row = deliver(rule == PAPER and theta <= 1.0, y, f, z, g, t, reached, grid, out, row)
-            idle = 0 if reached - t > SLIVER * step else idle + 1
+                row = deliver(rule == PAPER and theta <= 1.0, y, f, z, g, t, until, grid, out, row)
+            idle = 0 if until - t > SLIVER * step else idle + 1
             if idle > MAX_IDLE:
-                return Outcome.STALLED.value, row, found
-            y, t = z, reached
+                return Outcome.STALLED.value, (t, y, number, row, found, idle)
+            y, t = z, until
             if theta <= 1.0:
                 if found == events.shape[0]:
-                    return Outcome.EVENTS_FULL.value, row, found
+                    return Outcome.EVENTS_FULL.value, (t, y, number, row, found, idle)
                 found = change(events, found, t, side, mode, after, y)
                 changed[side], free[side] = t, rule == LOCATED
         if not math.isfinite(y[0] + y[1] + y[2] + y[3] + y[4] + y[5]):
-            return Outcome.NOT_FINITE.value, row, found
-    return Outcome.DONE.value, row, found
+            return Outcome.NOT_FINITE.value, (t, y, number, row, found, idle)
+    return Outcome.DONE.value, (t, y, number, row, found, idle)

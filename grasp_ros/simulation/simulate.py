@@ -78,8 +78,8 @@ def simulate(
         Keys of the scene, "section.key", with respect to which the motion is differentiated through its impacts, see
         `Trajectory.sensitivity`. This takes two runs: event times of the first are output times of the second.
     progress : callable or True, optional
-        True: a bar, in a terminal or in a notebook. A callable gets the time reached, in s: at the end of the
-        horizon, if the run gets there, and on the way, except by methods with a fixed step.
+        True: a bar, in a terminal or in a notebook. A callable gets the time reached, in s: on the way, and
+        at the end of the horizon, if the run gets there.
 
     Raises
     ------

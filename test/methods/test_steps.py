@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from documents import horizon
+from documents import case_of, horizon
 from oracles import FREE, STANDARD, energy, flight_array, make_grasp
 
 from grasp_ros.methods import discrete_gradient, fixed_step
@@ -72,6 +72,15 @@ def test_the_order_where_nothing_touches(solve: Any, order: float, least: int, w
     errors = [swing_error(solve(problem_of(SWING, AWAY, times, h)), times) for h in steps]
     assert slope(steps, errors) == pytest.approx(order, abs=within)
     assert errors[-1] < (1e-7 if order == 4.0 else 1e-3)
+
+
+@pytest.mark.parametrize("method", ["paper", "rk4", "rk4_events", "discrete_gradient"])
+def test_pieces_change_no_bit(monkeypatch: pytest.MonkeyPatch, method: str) -> None:
+    whole = simulate(case_of(), method=method, setting=1e-3)
+    monkeypatch.setattr("grasp_ros.methods.equations.PIECE", 7)
+    parts = simulate(case_of(), method=method, setting=1e-3)
+    for one, other in ((whole.state, parts.state), (whole.event_table, parts.event_table), (whole.work, parts.work)):
+        assert np.array_equal(one, other)
 
 
 def test_paper_touch_step_by_hand() -> None:

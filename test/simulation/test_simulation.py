@@ -58,10 +58,12 @@ def test_commands_follow_4_and_5() -> None:
 
 @pytest.mark.parametrize(
     ("reports", "settings"),
-    [(5, {"sampled": True}), (5, {}), (1, {"method": "rk4"}), (5, {"method": "rk45"}), (5, {"method": "rk45_events"})],
+    [(5, {"sampled": True}), (5, {}), (5, {"method": "rk4"}), (5, {"method": "paper"}),
+     (5, {"method": "discrete_gradient"}), (5, {"method": "rk45"}), (5, {"method": "rk45_events"})],
 )
 def test_progress_is_reported(monkeypatch: pytest.MonkeyPatch, reports: int, settings: dict[str, Any]) -> None:
     monkeypatch.setattr("grasp_ros.exact.integrator.BREATH", 20)  # of some 400
+    monkeypatch.setattr("grasp_ros.methods.equations.PIECE", 2**14)  # of 100,000 steps
     seen: list[float] = []
     simulate(case_of(duration=10.0), progress=seen.append, **settings)
     assert seen == sorted(seen)
