@@ -104,16 +104,16 @@ def sides_of(words: Sequence[str]) -> dict[str, str]:
     """Where the controllers of `--controller` are found, "module:object" by side."""
     found: dict[str, str] = {}
     for word in words:
-        side, _, place = word.partition("=")
-        if side not in SIDES or not all(place.partition(":")):
+        side, _, law = word.partition("=")
+        if side not in SIDES or not all(law.partition(":")):
             raise Refused(f"--controller: {word} is not allowed; allowed: side=module:object, with the side"
                           f" {' or '.join(SIDES)}")
         if side in found:
             raise Refused(f"--controller: {word} is not allowed; allowed: one for the {side} side")
-        found[side] = place
+        found[side] = law
     return found
 
 
 def load_controllers(words: Sequence[str]) -> dict[str, Law | type]:
     """The callables by side."""
-    return {side: find_law(place, f"--controller: {side}={place}") for side, place in sides_of(words).items()}
+    return {side: find_law(law, f"--controller: {side}={law}") for side, law in sides_of(words).items()}

@@ -105,7 +105,7 @@ def _reach(options: argparse.Namespace) -> None:
 def _run(options: argparse.Namespace) -> int:
     need("this", "rclpy", "mcap", "rosbags", "zstandard")
     _reach(options)
-    laws = {f"{side}_controller": place for side, place in sides_of(options.laws).items()}
+    laws = {f"{side}_controller": law for side, law in sides_of(options.laws).items()}
     scene = load_scene(options.scene, options.settings)
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
     check_limits(options, lockstep=options.free_running is None)

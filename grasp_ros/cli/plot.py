@@ -84,8 +84,8 @@ def _plot(options: argparse.Namespace) -> int:
         return 0
     panels = [plots.PANELS[name] for name in options.panels or plots.PANELS]
     if isinstance(motions[0], Trajectory) and (found := motions[0].sensitivity) is not None:
-        panels += [plots.Panel(partial(_draw, found, place), "derivative, m per unit", 2)
-                   for place in range(len(found.keys))]
+        panels += [plots.Panel(partial(_draw, found, j), "derivative, m per unit", 2)
+                   for j in range(len(found.keys))]
     figure = plots.compose(motions, width_mm=options.width, span=span, panels=panels)
     write_figure(figure, output)
     return 0
@@ -146,9 +146,9 @@ def _beside(source: str, ending: str) -> Path:
         return Path(f"{path.resolve()}{ending}") if path.is_dir() else path.with_suffix(ending)
 
 
-def _draw(found: Sensitivity, place: int, axes: Axes, _: Motion) -> None:
+def _draw(found: Sensitivity, j: int, axes: Axes, _: Motion) -> None:
     """Derivatives of the positions by one number, over time."""
-    rates = found.state_rates[:, ::2, place]
+    rates = found.state_rates[:, ::2, j]
     sizes = np.abs(rates[rates != 0.0])
     if len(sizes) and sizes.max() > WIDE * np.median(sizes):
         axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(np.median(sizes))))
@@ -158,4 +158,4 @@ def _draw(found: Sensitivity, place: int, axes: Axes, _: Motion) -> None:
                   linewidth=1.0)
     if found.corner is not None:
         axes.axvline(found.corner, color="black", linewidth=0.8, linestyle=":", label="one-sided from here")
-    axes.set_title(f"by {found.keys[place]}", loc="left", fontsize="small", parse_math=False)
+    axes.set_title(f"by {found.keys[j]}", loc="left", fontsize="small", parse_math=False)

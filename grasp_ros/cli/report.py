@@ -108,12 +108,12 @@ def last_rates(found: Sensitivity) -> dict[str, dict[str, Any]]:
     """Derivatives as data, number by number: at the last time of the state (6,) and V_c, and of the times of events."""
     level_rates = found.V_c_rates[-1]
     return {
-        key: {"t": found.t[-1], "state": found.state_rates[-1, :, place], "V_c": level_rates[place],
+        key: {"t": found.t[-1], "state": found.state_rates[-1, :, j], "V_c": level_rates[j],
               "corner": found.corner, "corner_reason": found.corner_reason, "events": [
                   {"time_s": event[Entry.TIME], "kind": Transition(int(event[Entry.KIND])).name,
                    "body": Body(int(event[Entry.BODY])).name, "rate": rate}
-                  for event, rate in zip(found.event_table, found.event_rates[:, place], strict=True)]}
-        for place, key in enumerate(found.keys)
+                  for event, rate in zip(found.event_table, found.event_rates[:, j], strict=True)]}
+        for j, key in enumerate(found.keys)
     }
 
 

@@ -27,7 +27,7 @@ def two_sum(a: float, b: float) -> tuple[float, float]:
 
 @kernel
 def velocity_lane(body: Body) -> int:
-    """Place of a body's velocity in the state; its position stands before it."""
+    """Index of a body's velocity in the state; its position stands before it."""
     return V.O if body == OBJECT else (V.L if body == LEFT else V.R)
 
 

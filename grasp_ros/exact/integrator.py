@@ -201,7 +201,7 @@ class Integrator:
         Parameters
         ----------
         loop : Loop
-            What drives the run; `Place.INTERVAL` in its `place` counts the intervals done.
+            What drives the run; `Cursor.INTERVAL` in its `cursor` counts the intervals done.
         grid : array (n,), s
             Output times, ascending within each interval and counted from its beginning.
         rows : array (n, 6), optional

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.physics.control import Column
-from grasp_ros.physics.layout import LANES, Kind, Pair, Place
+from grasp_ros.physics.layout import LANES, Cursor, Kind, Pair
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -32,7 +32,7 @@ class Plant(NamedTuple):
 
 
 BODY_NUMBERS, PAIR_NUMBERS = 12, 4
-COULOMB = 2 * BODY_NUMBERS + PAIR_NUMBERS  # its place in the block of a plant
+COULOMB = 2 * BODY_NUMBERS + PAIR_NUMBERS  # its index in the block of a plant
 PLANT_NUMBERS, STATE_NUMBERS = COULOMB + 4, 20
 REST_PLACE = 17  # where `State.rest` begins in the block of a state
 
@@ -104,7 +104,7 @@ class Loop(NamedTuple):
     lengths: Array  # (n,) s
     begins: Array  # (n,) s, on the clock of the events
     bounds: Integers  # (n + 1,) output times before each, counted from the first
-    place: Integers  # (4,) see `layout.Place`; updated in place
+    cursor: Integers  # (4,) see `layout.Cursor`; updated in place
     inputs: Array = np.zeros((0, 3))  # (n, 3) forces that acted, N by body; (0, 3): those of the plant act on
     external: Array = np.zeros((0, 3))  # (n, 3) external forces, N by body; (0, 3): none
     answers: Array = np.zeros((0, 3))  # (n, 3) commands, N by body; (0, 3): no controllers
@@ -116,20 +116,20 @@ class Loop(NamedTuple):
 
 
 _UNKNOWN = np.full(3, Pair.UNKNOWN.value)
-_FIRST = np.array([-1 if entry == Place.FAILED else 0 for entry in Place])
+_FIRST = np.array([-1 if entry == Cursor.FAILED else 0 for entry in Cursor])
 
 
-def new_place(tick: int = 0) -> Integers:
+def new_cursor(tick: int = 0) -> Integers:
     """Where a loop begins; the tick is that of its first interval. A copy takes half as long as a new array."""
-    place = _FIRST.copy()
+    cursor = _FIRST.copy()
     if tick:
-        place[Place.TICK] = tick
-    return place
+        cursor[Cursor.TICK] = tick
+    return cursor
 
 
 def one_interval(length: float, begin: float, outputs: int) -> Loop:
     """An interval of `length` from `begin` on, in s, with so many output times."""
-    return Loop(np.array([length]), np.array([begin]), np.array([0, outputs]), new_place())
+    return Loop(np.array([length]), np.array([begin]), np.array([0, outputs]), new_cursor())
 
 
 FACTORS = 32  # numbers of one order in the table of factors

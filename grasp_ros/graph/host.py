@@ -69,7 +69,7 @@ def _stays(given: Mapping[str, str]) -> bool:
     return (given.get(RANGE) or LOCALHOST) == LOCALHOST
 
 
-def place(given: Mapping[str, str], namespace: str) -> str:
+def location(given: Mapping[str, str], namespace: str) -> str:
     """Where a process with these variables looks for others, in words."""
     reach = "this host" if _stays(given) else "the network"
     server = given.get(SERVER)
@@ -93,7 +93,7 @@ def hold(given: Mapping[str, str], namespace: str) -> socket.socket:
         held.close()
         if error.errno != errno.EADDRINUSE:
             raise
-        raise Refused(f"a graph or a replay already runs {place(given, namespace)}; allowed: another {DOMAIN} or"
+        raise Refused(f"a graph or a replay already runs {location(given, namespace)}; allowed: another {DOMAIN} or"
                       " --namespace") from None
     return held
 

@@ -73,7 +73,7 @@ class Graph:
     # The children read the other end: when this one closes, however that comes, they end. They say there why they end.
     _lifeline: socket.socket | None = None
     _causes: list[tuple[float, str, int]] = field(default_factory=list)  # wall time, what was said then, status
-    _place: socket.socket | None = None  # see `host.hold`
+    _hold: socket.socket | None = None  # see `host.hold`
 
     @property
     def bag(self) -> Path:
@@ -101,7 +101,7 @@ class Graph:
             raise Refused(f"{name}: --controller and --without; allowed: one of the two")
         scene_file = self.directory / f"{self.scene.name}.yaml"
         commands = self._commands(self._settings(scene_file))
-        self._place = hold(os.environ, self.namespace)
+        self._hold = hold(os.environ, self.namespace)
         try:
             with new_directory(self.directory):
                 scene_file.write_text(self.scene.to_yaml(), encoding="utf-8")
@@ -238,9 +238,9 @@ class Graph:
             with suppress(ProcessLookupError):  # its whole session: what a law has started ends, too
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
-        for held in filter(None, (self._lifeline, self._place)):
+        for held in filter(None, (self._lifeline, self._hold)):
             held.close()
-        self._lifeline = self._place = None
+        self._lifeline = self._hold = None
         statuses = {name: process.returncode for name, process in self.processes.items()}
         if any(status < 0 for status in statuses.values()):  # killed: what it has left is of no use to anybody
             remove_left()

@@ -58,9 +58,9 @@ class Template:
         self.count, size = count, _NUMBER.size
         marks = [_MARK * (number + 1) for number in range(count)]
         cdr = serialize(marks)
-        places = [cdr.index(_NUMBER.pack(mark)) for mark in marks]
-        ends = [len(_HEAD) + _STAMP.size, *(place + size for place in places)]
-        gaps = [begin - end for end, begin in zip(ends, [*places, len(cdr)], strict=True)]  # before, between and behind
+        begins = [cdr.index(_NUMBER.pack(mark)) for mark in marks]
+        ends = [len(_HEAD) + _STAMP.size, *(begin + size for begin in begins)]
+        gaps = [begin - end for end, begin in zip(ends, [*begins, len(cdr)], strict=True)]  # before, between and behind
         self._form = struct.Struct(f"<{len(_HEAD)}siI" + "d".join(f"{gap}s" for gap in gaps))
         self._parts = list(self._form.unpack(cdr))  # head, seconds, nanoseconds; then gaps and numbers in turn
         self._gaps = tuple(self._parts[3::2])

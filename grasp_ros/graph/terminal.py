@@ -62,8 +62,8 @@ class View:
 
     def __init__(self, scene: Scene, hint: str = "") -> None:
         self.scene, self.hint = scene, hint
-        places = np.abs(scene.initial_state[0::2])
-        self._reach = 1.25 * float(places.max()) or 1.0
+        positions = np.abs(scene.initial_state[0::2])
+        self._reach = 1.25 * float(positions.max()) or 1.0
         self._most = 0.0  # energy shown so far, J
 
     def draw(self, moment: Moment, width: int = WIDEST) -> RenderableType:
@@ -79,7 +79,7 @@ class View:
         return Panel(parts, title=Text(self.scene.title), subtitle=Text(below), width=width)
 
     def _line(self, state: Array, track: int) -> Text:
-        """Each body at its place; one that is behind another is moved aside by a character."""
+        """Each body at its position; one that is behind another is moved aside by a character."""
         row, taken = Text(" " * track), -1
         for body in sorted(NAMES, key=lambda body: COLUMN[body]):
             x = float(state[COLUMN[body]])
@@ -102,13 +102,13 @@ class View:
         force = "f, N" if narrow else "command, N" if moment.answers else "acted, N"
         for heading in ("", "x, m", "v, m/s", force, "fw, N" if narrow else "impact, N"):
             table.add_column(heading, justify="right" if heading else "left")
-        places = 3 if narrow else 5
+        decimals = 3 if narrow else 5
         for body, name in NAMES.items():
             x, v = moment.state[COLUMN[body] : COLUMN[body] + 2]
             if not np.isnan(x):
                 forces = [moment.commands.get(name), moment.impacts.get(name)] if name in SIDES else [None, None]
-                words = ["" if force is None or np.isnan(force) else f"{force:+.{places - 1}f}" for force in forces]
-                table.add_row(Text(name, style=STYLES[name]), f"{x:+.{places}f}", f"{v:+.{places}f}", *words)
+                words = ["" if force is None or np.isnan(force) else f"{force:+.{decimals - 1}f}" for force in forces]
+                table.add_row(Text(name, style=STYLES[name]), f"{x:+.{decimals}f}", f"{v:+.{decimals}f}", *words)
         return table
 
     def _energy(self, level: Mapping[str, float], width: int) -> list[RenderableType]:

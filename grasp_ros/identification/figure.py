@@ -19,12 +19,12 @@ def measured_and_fitted(found: Fit) -> Figure:
     with style({"font.size": 9.0}):
         figure, panels = subplots(len(parts) + 1, figsize=(9.0, 2.4 * (len(parts) + 1)), sharex=True)
         for axes, (label, part) in zip(panels, parts, strict=False):
-            for body, place in ((body, place + part) for body, place in COLUMN.items() if seen[place + part]):
-                axes.plot(found.t, found.measured[:, place], ".", color=COLORS[body], markersize=2.5, alpha=0.4)
-                axes.plot(found.t, found.fitted[:, place], color=COLORS[body], linewidth=1.0, label=NAMES[body])
+            for body, column in ((body, first + part) for body, first in COLUMN.items() if seen[first + part]):
+                axes.plot(found.t, found.measured[:, column], ".", color=COLORS[body], markersize=2.5, alpha=0.4)
+                axes.plot(found.t, found.fitted[:, column], color=COLORS[body], linewidth=1.0, label=NAMES[body])
             axes.set_ylabel(label)
-        for body, place in COLUMN.items():
-            for column in (place, place + 1):
+        for body, first in COLUMN.items():
+            for column in (first, first + 1):
                 rest = found.residuals[:, column] / found.noise[column]
                 panels[-1].plot(found.t, rest, ".", color=COLORS[body], markersize=1.5)
         panels[-1].set_ylabel("residual / noise")

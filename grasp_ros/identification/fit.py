@@ -15,7 +15,7 @@ from grasp_ros.physics.errors import Refused, need
 from grasp_ros.physics.given import mapping, names, number, truth
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.scene.places import check_scene
+from grasp_ros.scene.targets import check_scene
 from grasp_ros.sensitivity.directions import check_keys
 
 FARTHEST = 1.0  # a factor of ten, in y, beyond which it has no end
@@ -56,7 +56,7 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
         check_scene(scene)
     free, found = names("free", free), measured(data, scene, truth("by_sensors", by_sensors))
     against = {key: number(f"against: {key}", value) for key, value in mapping("against", against).items()}
-    seen = {key: float(found.state[0, place]) for place, key in enumerate(INITIAL) if place in found.channels}
+    seen = {key: float(found.state[0, i]) for i, key in enumerate(INITIAL) if i in found.channels}
     begun = found.scene.changed({key: seen[key] for key in free if key in seen} if found.t[0] == 0.0 else {})
     numbers = numbers_of(begun, free, found)
     if any(acts(begun, number.key) for number in numbers):
@@ -80,7 +80,7 @@ def _result(problem: FitProblem, against: Mapping[str, float]) -> Fit:
     data, rows, y = problem.data, len(problem.data.t), np.zeros(len(problem.numbers))
     values, slopes = problem.residuals(y, rows)
     states, _, touches = problem.predict(y, rows)
-    states[:, [place for place in range(6) if place not in data.channels]] = np.nan
+    states[:, [i for i in range(6) if i not in data.channels]] = np.nan
     covariance, reach, unseen = identifiability_of(slopes, values, len(y))
     below, above = _reaches(problem, reach, covariance, values)
     estimates = problem.values(y)
@@ -89,11 +89,11 @@ def _result(problem: FitProblem, against: Mapping[str, float]) -> Fit:
     low, high = np.maximum(found - scale * below, least), found + scale * above
     lost = (low == least) & np.isinf(high)  # nothing is excluded
     covariance[lost], covariance[:, lost] = np.nan, np.nan
-    unseen += [[place] for place in np.flatnonzero(lost).tolist() if not any(place in places for places in unseen)]
+    unseen += [[i] for i in np.flatnonzero(lost).tolist() if not any(i in indices for indices in unseen)]
     return Fit(
         problem.scene_at(y), data.name, data.acting, tuple(estimates), found, low, high,
         covariance * np.outer(scale, scale),
-        tuple(tuple(problem.numbers[place].key for place in places) for places in unseen),
+        tuple(tuple(problem.numbers[i].key for i in indices) for indices in unseen),
         data.t, data.state, states, np.where(np.isin(range(6), data.channels), problem.noise, np.nan),
         residual_table(values.reshape(rows, -1), data.t, touches), missed(data, problem.noise),
         {key: _test(problem, key, value, values) for key, value in against.items()},
@@ -127,15 +127,15 @@ def _reaches(problem: FitProblem, reach: Array, covariance: Array, best: Array) 
 
     enough = 2.0 * stats.f.ppf(CONFIDENCE, 1, len(best) - len(problem.numbers))
     below, above = reach.copy(), reach.copy()
-    for place, own in enumerate(problem.numbers):
-        others = np.nan_to_num(covariance[place] / covariance[place, place])  # go with it
+    for i, own in enumerate(problem.numbers):
+        others = np.nan_to_num(covariance[i] / covariance[i, i])  # go with it
         for side, sign in ((below, -2.0), (above, 2.0)):
-            while side[place] < FARTHEST and own.at(y := sign * side[place]) > own.least:
+            while side[i] < FARTHEST and own.at(y := sign * side[i]) > own.least:
                 fixed = problem.fixed(own.key, float(own.at(y)))
                 found = refine(fixed, others * y, len(problem.data.t))
                 if _growth(mean_square(fixed, found), problem, best) >= enough:
                     break
-                side[place] *= 2.0
-                if side[place] >= FARTHEST:
-                    side[place] = np.inf
+                side[i] *= 2.0
+                if side[i] >= FARTHEST:
+                    side[i] = np.inf
     return below, above

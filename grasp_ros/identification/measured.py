@@ -65,7 +65,7 @@ class Measured(NamedTuple):
     @property
     def channels(self) -> list[int]:
         """Columns of the state that are measured."""
-        return [place for place in range(6) if not np.isnan(self.state[:, place]).any()]
+        return [column for column in range(6) if not np.isnan(self.state[:, column]).any()]
 
 
 def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> Measured:
@@ -164,10 +164,10 @@ def _columns(path: Path) -> Mapping[str, Array]:
     if T not in names or not {*CHANNELS} & {*names}:
         raise Refused(f"{path}: line 1: {', '.join(names)}; allowed: {T} and at least one of {', '.join(CHANNELS)},"
                       " with commas between them")
-    for place, name in enumerate(names):
+    for column, name in enumerate(names):
         if name not in HEADS.values():
             raise Refused(f"{path}: column {name!r}: not known; {allowed(name, [*HEADS.values()])}")
-        if name in names[:place]:
+        if name in names[:column]:
             raise Refused(f"{path}: line 1: {', '.join(names)}; allowed: each name once")
     rows = []
     for number, line in enumerate(lines, 2):
@@ -189,19 +189,19 @@ def _checked(found: Measured) -> Measured:
         raise Refused(f"{name}: {len(found.t)} samples; allowed: at least {FEWEST}")
     t = given.ascending(f"{name}: {T}", found.t, found.scene.duration, strictly=True)
     found = found._replace(t=t)  # kernels read a row of numbers, no column of a table
-    for place, channel in enumerate(CHANNELS):
-        gone = ~(np.abs(found.state[:, place]) <= LARGEST_POSITION)
-        if gone.any() and not np.isnan(found.state[:, place]).all():
+    for column, channel in enumerate(CHANNELS):
+        gone = ~(np.abs(found.state[:, column]) <= LARGEST_POSITION)
+        if gone.any() and not np.isnan(found.state[:, column]).all():
             at = int(np.argmax(gone))
-            raise Refused(f"{name}: {channel}: {float(found.state[at, place])!r} at t = {t[at]:g} s; allowed: numbers"
+            raise Refused(f"{name}: {channel}: {float(found.state[at, column])!r} at t = {t[at]:g} s; allowed: numbers"
                           f" throughout, of a size <= {LARGEST_POSITION:g}, or a column that is not there")
-        if not gone.any() and BODIES[place // 2] not in present:
+        if not gone.any() and BODIES[column // 2] not in present:
             raise Refused(f"{name}: {channel}: {found.scene.name} has no such body")
     if not found.channels:
         raise Refused(f"{name}: no state is measured")
     for kind, part in (("positions", 0), ("velocities", 1)):
-        places = [place for place in found.channels if place % 2 == part]
-        if places and not np.ptp(found.state[:, places], axis=0).any():
+        columns = [column for column in found.channels if column % 2 == part]
+        if columns and not np.ptp(found.state[:, columns], axis=0).any():
             raise Refused(f"{name}: {kind} do not change; allowed: a motion, or no such columns")
     if found.inputs is not None and not np.isfinite(found.inputs).all():
         raise Refused(f"{name}: inputs are missing; allowed: a number for every control period")

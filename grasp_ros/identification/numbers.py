@@ -61,7 +61,7 @@ def numbers_of(scene: Scene, keys: Sequence[str], data: Measured) -> tuple[Numbe
     Refused: a key that is given twice, is not in the scene, does not enter smoothly, or starts from 0 where only
     positive numbers are allowed.
     """
-    twice = [key for place, key in enumerate(keys) if key in keys[:place]]
+    twice = [key for i, key in enumerate(keys) if key in keys[:i]]
     if twice:
         raise Refused(f"free: {twice[0]}: given twice")
     found = tuple(_offset(key, data) if key.startswith(OFFSET) else _number(scene, key) for key in keys)
@@ -78,7 +78,7 @@ def acts(scene: Scene, key: str) -> bool:
 
 
 def _offset(key: str, data: Measured) -> Number:
-    known = [CHANNELS[place] for place in data.channels]
+    known = [CHANNELS[i] for i in data.channels]
     if key.removeprefix(OFFSET) not in known:
         raise Refused(f"free: {key}: not measured; {allowed(key, [OFFSET + name for name in known])}")
     return Number(key, 0.0, False)

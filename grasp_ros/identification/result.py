@@ -117,7 +117,7 @@ def identifiability_of(slopes: Array, residuals: Array, n: int) -> tuple[Array, 
     """What residuals (m,) in standard deviations, with derivatives (m, n), say of n numbers y.
 
     Their covariance (n, n), NaN for what is not identifiable; half of their confidence intervals (n,), inf for that;
-    and places of the numbers of each direction that is not seen, whose standard deviation is not below 1.
+    and indices of the numbers of each direction that is not seen, whose standard deviation is not below 1.
     """
     from scipy import linalg, stats
 
@@ -127,12 +127,12 @@ def identifiability_of(slopes: Array, residuals: Array, n: int) -> tuple[Array, 
     blind = singular <= BLIND * singular[0]
     lost_directions = directions[blind | (singular < math.sqrt(variance))]
     if len(lost_directions) > 1:  # of their combinations those of few numbers: each has one that no other has
-        places = linalg.qr(lost_directions, mode="r", pivoting=True)[1][: len(lost_directions)]
-        lost_directions = np.linalg.solve(lost_directions[:, np.sort(places)], lost_directions)
+        indices = linalg.qr(lost_directions, mode="r", pivoting=True)[1][: len(lost_directions)]
+        lost_directions = np.linalg.solve(lost_directions[:, np.sort(indices)], lost_directions)
     unseen = sorted(np.flatnonzero(np.abs(direction) > PART).tolist() for direction in lost_directions)
     scaled = directions[~blind] / singular[~blind, None]
     covariance = variance * scaled.T @ scaled
-    lost = sorted({place for places in unseen for place in places})
+    lost = sorted({i for indices in unseen for i in indices})
     reach = np.sqrt(np.diag(covariance)) * stats.t.ppf(0.5 + 0.5 * CONFIDENCE, free)
     reach[lost] = np.inf
     covariance[lost], covariance[:, lost] = np.nan, np.nan

@@ -73,16 +73,16 @@ class FitProblem(NamedTuple):
 
         Numbers outside the domain, and a run that does not get there, are refused.
         """
-        places = [place for place, number in enumerate(self.numbers) if number.channel is None]
-        keys = [self.numbers[place].key for place in places]
+        indices = [i for i, number in enumerate(self.numbers) if number.channel is None]
+        keys = [self.numbers[i].key for i in indices]
         states, found, touches = motion(self.data, self.scene_at(y), keys, rows)
         rates, values = np.zeros((*states.shape, len(y))), self.values(y)
-        rates[:, :, places] = found
-        for place, number in enumerate(self.numbers):
+        rates[:, :, indices] = found
+        for i, number in enumerate(self.numbers):
             if number.channel is not None:
                 states[:, number.channel] += values[number.key]
-                rates[:, number.channel, place] = 1.0
-            rates[:, :, place] *= number.slope(values[number.key])
+                rates[:, number.channel, i] = 1.0
+            rates[:, :, i] *= number.slope(values[number.key])
         return states, rates, touches
 
     def residuals(self, y: Array, rows: int) -> tuple[Array, Array]:
@@ -176,7 +176,7 @@ def missed(data: Measured, noise: Array) -> tuple[str, ...]:
     """
     spread = np.tile(np.fmax.reduce(np.std(data.state, axis=0).reshape(3, 2)), 3)
     far = (noise > FAR * first_noise(data)) & (noise > PART * spread)
-    return tuple(CHANNELS[place] for place in data.channels if far[place])
+    return tuple(CHANNELS[i] for i in data.channels if far[i])
 
 
 def fitted(problem: FitProblem) -> FitProblem:

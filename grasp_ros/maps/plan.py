@@ -15,7 +15,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import number, read_number, text, truth, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.scene.places import parameter_of
+from grasp_ros.scene.targets import parameter_of
 from grasp_ros.simulation.chunk import Setup, Variants, check
 
 POINTS, MOST, MOST_AXES, DIGITS = 101, 10**9, 2, 15
@@ -121,8 +121,8 @@ class Plan:
         if self.sample:
             columns = [np.ascontiguousarray(column) for column in self._sample[first:last].T]
         else:
-            places = np.unravel_index(np.arange(first, last), self.shape)
-            columns = [axis.values[place] for axis, place in zip(self.axes, places, strict=True)]
+            indices = np.unravel_index(np.arange(first, last), self.shape)
+            columns = [axis.values[index] for axis, index in zip(self.axes, indices, strict=True)]
         pairs = zip(self.axes, columns, strict=True)
         return Variants(self.scene, {key: column for axis, column in pairs for key in axis.keys})
 

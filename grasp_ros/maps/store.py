@@ -97,7 +97,7 @@ def _create(path: Path, plan: Plan, document: dict[str, Any], height: int) -> No
             group.create_array(column.name, **grid, dtype="f8", fill_value=np.nan,
                                attributes={"units": column.unit, "long_name": column.text})
         group.create_array(STATUS, **grid, dtype="i1", fill_value=NOT_DONE,
-                           attributes={"long_name": f"{NOT_DONE}: not done; otherwise a place in `statuses`"})
+                           attributes={"long_name": f"{NOT_DONE}: not done; otherwise an index of `statuses`"})
         for i, axis in enumerate(plan.axes):
             values = plan.variants(0, plan.rows).changes[axis.keys[0]] if plan.sample else axis.values
             name = names[0] if plan.sample else names[i]

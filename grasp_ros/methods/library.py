@@ -60,7 +60,7 @@ def jacobian(t: float, y: Any, q: Any, push_l: bool, push_r: bool) -> Any:
 def solve(name: str, located: bool, problem: Problem) -> Solution:
     """Integrate with one of scipy's solvers, rtol = atol: from event to event if they are located, or at one go."""
     q, work = parameters(problem.system), np.zeros(len(Work), dtype=np.int64)
-    grid, place = np.unique(problem.grid, return_inverse=True)  # scipy refuses a time that comes twice
+    grid, index = np.unique(problem.grid, return_inverse=True)  # scipy refuses a time that comes twice
     t, y, row, idle, states = 0.0, problem.system.state, 0, 0, [np.empty((0, 6))]
     mode = [condition(q, tuple(y), side) if located else Pair.CONTACT for side in (LEFT, RIGHT)]
     gaps = [_gaps(side, problem.system.pairs[side, Law.DISSIPATION], work) for side in (LEFT, RIGHT) if located]
@@ -95,7 +95,7 @@ def solve(name: str, located: bool, problem: Problem) -> Solution:
         status = Status.EVENT_BUDGET if len(events) > problem.max_events else None
     found = np.concatenate(states)  # as far as it came, at distinct times
     found[grid[: len(found)] == 0.0] = problem.system.state  # which LSODA interpolates
-    return Solution(found[place[place < len(found)]], np.array(events).reshape(-1, 5), work, status)
+    return Solution(found[index[index < len(found)]], np.array(events).reshape(-1, 5), work, status)
 
 
 class _Gap:

@@ -23,7 +23,7 @@ from grasp_ros.exact.integrator import BREATH, compile_kernels
 from grasp_ros.exact.records import COULOMB, Array, Integers, Loop, Output, Plant, State, new_run, one_interval
 from grasp_ros.observe.observer import BEGIN, RunObserver
 from grasp_ros.observe.record import UNDECIDED, Memory, Seen, Switch, Wanted
-from grasp_ros.physics.layout import Entry, Filled, Of, Outcome, Pair, Place, Transition, Work
+from grasp_ros.physics.layout import Cursor, Entry, Filled, Of, Outcome, Pair, Transition, Work
 
 
 class Rows(NamedTuple):
@@ -97,8 +97,8 @@ def load_row(rows: Rows, i: int, room: Room, memory: Memory) -> None:
         for column in range(2):
             memory.gains[side, column] = rows.gains[i, side, column]
             room.plant.pairs[side, column] = rows.pairs[i, side, column]
-    for place in range(6):
-        room.state.y[place] = rows.state[i, place]
+    for column in range(6):
+        room.state.y[column] = rows.state[i, column]
     room.plant_block[COULOMB] = rows.coulomb[i]
     state, out = room.state, room.out
     state.mode[:], state.clock[:], state.low[:], state.rest[:] = Pair.UNKNOWN.value, 0.0, 0.0, 0.0
@@ -109,8 +109,8 @@ def load_row(rows: Rows, i: int, room: Room, memory: Memory) -> None:
 @kernel
 def run_row(move: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, limits: Limits) -> int:
     """Integrate a row over the interval of the loop, and count its touches; why it ended."""
-    place = Loop(*driven).place
-    place[Place.INTERVAL] = place[Place.BEGUN] = 0
+    cursor = Loop(*driven).cursor
+    cursor[Cursor.INTERVAL] = cursor[Cursor.BEGUN] = 0
     outcome, events, out = np.int64(Outcome.EVENTS_FULL.value), 0, room.out
     while outcome == Outcome.EVENTS_FULL and events <= limits.max_events:
         outcome = move(
@@ -152,14 +152,14 @@ def run_rows(move: Any, driven: tuple[Any, ...], rows: Rows, room: Room, memory:
         load_row(rows, i, room, memory)
         tell(room.out.observer, BEGIN, limits.settled)
         outcome = run_row(move, driven, rows, i, room, limits)
-        for place in range(6):
-            rows.state[i, place] = room.state.y[place]
+        for column in range(6):
+            rows.state[i, column] = room.state.y[column]
         if room.out.observer[ADDRESS] != 0:
             tell(room.out.observer, FINISH, 0.0)
             if outcome == Outcome.DONE and memory.switches[Switch.WANTED] & Wanted.SETTLING.value:
                 outcome = go_on(move, driven, rows, i, room, memory, limits)
-            for place in range(memory.seen.shape[0]):
-                rows.seen[i, place] = memory.seen[place]
+            for column in range(memory.seen.shape[0]):
+                rows.seen[i, column] = memory.seen[column]
         rows.outcome[i] = outcome
 
 

@@ -125,9 +125,9 @@ def add_losses(segment: SegmentRecord) -> None:
     else:
         step_losses(segment)
     for body in (LEFT, OBJECT, RIGHT):
-        place = velocity_lane(body) - 1
+        lane = velocity_lane(body) - 1
         push = segment.m.given[body, Of.FORCE] - segment.m.base[body, Of.FORCE]
-        seen[Seen.WORK] += push * (segment.m.y[place] - segment.m.before[place])
+        seen[Seen.WORK] += push * (segment.m.y[lane] - segment.m.before[lane])
     if segment.m.bodies[OBJECT, Of.MASS] < math.inf:
         against = segment.m.given[OBJECT, Of.FORCE] - segment.m.bodies[OBJECT, Of.FORCE]
         seen[Seen.FRICTION] += against * (segment.m.y[X.O] - segment.m.before[X.O])

@@ -49,8 +49,8 @@ def begin(m: Memory, bound: float) -> None:
     for side in (LEFT, RIGHT):  # a pair may begin closed without force
         if m.pairs[side, Law.HERTZIAN] > 0.0 and y[U.L + side] > 0.0:
             seen[Seen.HIGH + U.L + side] = y[U.L + side]
-    for place in range(y.shape[0]):
-        m.before[place] = y[place]
+    for i in range(y.shape[0]):
+        m.before[i] = y[i]
     seen[Seen.LEVEL] = seen[Seen.LEAST] = level(m.loop, m.pairs, y)
     seen[Seen.BOUND], seen[Seen.SETTLED] = bound * max(abs(y[X.L]), abs(y[X.O]), abs(y[X.R])), math.nan
     for body in (LEFT, OBJECT, RIGHT):
@@ -94,8 +94,8 @@ def observe(address: int, kind: int, t: float, s: float, unit: float, degree: in
         seen[Seen.LEVEL] = level(m.loop, m.pairs, m.y)
         seen[Seen.RISE] = max(seen[Seen.RISE], seen[Seen.LEVEL] - seen[Seen.LEAST])
         seen[Seen.LEAST] = min(seen[Seen.LEAST], seen[Seen.LEVEL])
-    for place in range(m.y.shape[0]):
-        m.before[place] = m.y[place]
+    for i in range(m.y.shape[0]):
+        m.before[i] = m.y[i]
     return 0
 
 

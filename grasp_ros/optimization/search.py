@@ -202,11 +202,11 @@ def search(problem: DesignProblem, seed: int = 0, progress: Callback | None = No
     agreed = 0  # generations in a row
 
     def is_over(intermediate_result: Any) -> bool:
-        """Where all members have the same outcome at different places, one that is better may lie between them."""
+        """Where all members have the same outcome at different points, one that is better may lie between them."""
         nonlocal agreed
-        reached, places = intermediate_result.population_energies, intermediate_result.population
+        reached, points = intermediate_result.population_energies, intermediate_result.population
         agreed = agreed + 1 if np.std(reached) <= AGREE * abs(np.mean(reached)) else 0
-        done = np.ptp(places, axis=0).max() <= NEAR or reached.min() >= NOTHING
+        done = np.ptp(points, axis=0).max() <= NEAR or reached.min() >= NOTHING
         return bool(agreed > (0 if done else PLATEAU))
 
     found = differential_evolution(
@@ -215,11 +215,11 @@ def search(problem: DesignProblem, seed: int = 0, progress: Callback | None = No
         polish=False, updating="deferred", vectorized=True)
     ends = np.where(np.abs(found.x - np.rint(found.x)) < BESIDE, np.rint(found.x), found.x)
     single = np.where(np.eye(len(ends), dtype=bool), ends, found.x)
-    places = np.vstack([ends, single, found.x])  # a population may stop just before an end
-    reached = function(places.T)
+    points = np.vstack([ends, single, found.x])  # a population may stop just before an end
+    reached = function(points.T)
     least = float(reached.min())
-    place = places[int(np.argmax(reached <= least + AGREE * abs(least)))]
-    best = problem.numbers(place[None])
+    best_point = points[int(np.argmax(reached <= least + AGREE * abs(least)))]
+    best = problem.numbers(best_point[None])
     tried = problem.found(best)
     if least >= BROKEN:
         wish = " and ".join(f"{name} <= {most:g}" for name, most in problem.bounds)

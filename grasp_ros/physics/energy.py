@@ -121,30 +121,30 @@ def energy_balance(system: System, before: Array, after: Array, forces: Array) -
         for body in system.present:
             x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
             mass, stiffness, _, force = system.bodies[body]
-            own, own_size = body_energy(mass, stiffness, force, x, v, _place(system, body, state))
+            own, own_size = body_energy(mass, stiffness, force, x, v, _distance(system, body, state))
             level, size = level + own, size + own_size
         for side, u, _ in pairs_of(system, state):
             force = hertzian_force(Contact(*system.pairs[side]), u)
             level = level + elastic_level(system, side, u)
-            rounding = rounding + 8.0 * EPS * force * _place(system, side, state)
+            rounding = rounding + 8.0 * EPS * force * _distance(system, side, state)
         levels.append(level)
         rounding = rounding + ROUNDING * size
     work: Array = np.zeros(np.shape(before)[:-1])
     for body in system.present:
         work = work + 2.0 * forces[..., body] * (after[..., COLUMN[body]] - before[..., COLUMN[body]])
-        rounding = rounding + ROUNDING * np.abs(forces[..., body]) * _place(system, body, after)
+        rounding = rounding + ROUNDING * np.abs(forces[..., body]) * _distance(system, body, after)
     return EnergyBalance(levels[1] - levels[0], work, rounding)
 
 
-def body_energy(mass: Any, stiffness: Any, force: Any, x: Any, v: Any, place: Any) -> Any:
+def body_energy(mass: Any, stiffness: Any, force: Any, x: Any, v: Any, distance: Any) -> Any:
     """m v^2 + k x^2 - 2 f x in J of V, which is twice the energy, and the sum of the sizes of its terms, of roundings.
 
-    k (x - f/k)^2 differs by the constant f^2/k only, which may be far larger. `place` in m is the scale of the rounding
-    of x: |x| + |x_o| for an arm in contact, whose position follows from that of the object, also where x = 0. Of floats
-    or arrays: `exact.driver.energy_check` compiles the same source for every segment.
+    k (x - f/k)^2 differs by the constant f^2/k only, which may be far larger. `distance` in m is the scale of the
+    rounding of x: |x| + |x_o| for an arm in contact, whose position follows from that of the object, also where x = 0.
+    Of floats or arrays: `exact.driver.energy_check` compiles the same source for every segment.
     """
     kinetic = mass * v * v
-    size = kinetic + (stiffness * (abs(x) + EPS * place) + 2.0 * abs(force)) * place
+    size = kinetic + (stiffness * (abs(x) + EPS * distance) + 2.0 * abs(force)) * distance
     return kinetic + stiffness * x * x - 2.0 * force * x, size
 
 
@@ -165,10 +165,10 @@ def elastic_level(system: System, side: int, u: Array) -> Array:
     return np.asarray(2.0 * stored_energy(system.pairs[side, Law.HERTZIAN], np.maximum(u, 0.0)))
 
 
-def _place(system: System, body: int, state: Array) -> Array:
+def _distance(system: System, body: int, state: Array) -> Array:
     """Scale of the rounding of a body's position, m; with the object's for an arm, which may follow from it."""
-    place: Array = np.abs(state[..., COLUMN[body]])
-    return place + np.abs(state[..., COLUMN[OBJECT]]) if body != OBJECT and OBJECT in system.present else place
+    distance: Array = np.abs(state[..., COLUMN[body]])
+    return distance + np.abs(state[..., COLUMN[OBJECT]]) if body != OBJECT and OBJECT in system.present else distance
 
 
 def pairs_of(system: System, state: Array) -> list[tuple[int, Array, Array]]:

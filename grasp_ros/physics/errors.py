@@ -19,10 +19,10 @@ def printable(text: str) -> str:
     return "".join(sign if sign.isprintable() or sign == "\n" else repr(sign)[1:-1] for sign in text)
 
 
-def place_of(stack: Sequence[FrameSummary]) -> str:
+def line_of(stack: Sequence[FrameSummary]) -> str:
     """The innermost line of a stack, "file, line n"; if possible not in Python's own library, rclpy or numba."""
-    place = next((place for place in reversed(stack) if not OTHERS.search(place.filename)), stack[-1])
-    return f"{place.filename}, line {place.lineno}"
+    frame = next((frame for frame in reversed(stack) if not OTHERS.search(frame.filename)), stack[-1])
+    return f"{frame.filename}, line {frame.lineno}"
 
 
 def described(error: BaseException) -> str:
@@ -31,7 +31,7 @@ def described(error: BaseException) -> str:
         words = " ".join(str(error).split())
     except Exception:  # its `__str__` is foreign code, too
         words = "without words"
-    return ": ".join(filter(None, [type(error).__name__, words])) + f", {place_of(extract_tb(error.__traceback__))}"
+    return ": ".join(filter(None, [type(error).__name__, words])) + f", {line_of(extract_tb(error.__traceback__))}"
 
 
 class Refused(ValueError):  # noqa: N818 - it is what happens to the input, and no error of the package

@@ -139,10 +139,10 @@ def ascending(name: str, values: Any, end: float, strictly: bool = False) -> NDA
     after = np.greater if strictly else np.greater_equal
     within = not len(found) or (found.item(0) >= 0.0 and found.item(-1) <= end)  # of floats: a short run feels arrays
     if not (within and (len(found) < 2 or after(found[1:], found[:-1]).all())):
-        place = int(np.argmin(np.append(found[:1] >= 0.0, after(found[1:], found[:-1])) & (found <= end)))
-        late = f" after {float(found[place - 1])!r}" if place else ""
+        i = int(np.argmin(np.append(found[:1] >= 0.0, after(found[1:], found[:-1])) & (found <= end)))
+        late = f" after {float(found[i - 1])!r}" if i else ""
         once = ", each once" if strictly else ""
-        raise Refused(f"{name}: {float(found[place])!r}{late} is not allowed; allowed: ascending from 0 to {end!r} s"
+        raise Refused(f"{name}: {float(found[i])!r}{late} is not allowed; allowed: ascending from 0 to {end!r} s"
                       + once)
     return found
 

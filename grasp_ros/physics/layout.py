@@ -1,4 +1,4 @@
-"""Array layouts shared by everything: one place for every index, mode, transition and status.
+"""Array layouts shared by everything: every index, mode, transition and status.
 
 The state y (8,) is x_l, v_l, x_o, v_o, x_r, v_r, u_l, u_r. The penetrations follow from the positions, which have a low
 word each, see `exact.compensated`. Bodies are rows LEFT, RIGHT, OBJECT of an array (3, 4),
@@ -151,7 +151,7 @@ class Answer(IntEnum):
     LAW = 1  # the row of the side, see `control`
 
 
-class Place(IntEnum):
+class Cursor(IntEnum):
     """Where a loop stands."""
 
     INTERVAL = 0  # done so far in this call

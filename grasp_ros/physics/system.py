@@ -22,7 +22,7 @@ NO_LAW = ControlLaw()
 A_SYSTEM = "a System, such as the system of a Scene"
 BODIES = (LEFT, OBJECT, RIGHT)  # in the order of the state
 NAMES: dict[int, str] = {LEFT: "left", OBJECT: "object", RIGHT: "right"}
-Place = tuple[str, int, int]  # array of a system, row, column
+Target = tuple[str, int, int]  # array of a system, row, column
 COLUMN: dict[int, int] = {LEFT: 0, OBJECT: 2, RIGHT: 4}  # of the position in a state (6,); the velocity is the next
 PAIR_COLUMNS: dict[int, tuple[int, int]] = {LEFT: (0, 2), RIGHT: (2, 4)}  # of the positions between which u is
 
@@ -51,9 +51,9 @@ class System:
     sampled: bool = False  # whether commands are held over control periods; otherwise the feedback acts continuously
     caveats: list[str] = field(default_factory=list)  # why V_c may rise
 
-    def put(self, place: Place, number: float) -> None:
-        """Write a number of a scene into its place; the first one of a controller makes its law."""
-        array, row, column = place
+    def put(self, target: Target, number: float) -> None:
+        """Write a number of a scene to its target; the first one of a controller makes its law."""
+        array, row, column = target
         if array == "coulomb":
             self.coulomb = number
         elif array == "laws":

@@ -16,14 +16,14 @@ from grasp_ros.physics.observation import CALLABLE, observables_of
 FAULTS = (Exception, SystemExit, GeneratorExit)  # of a user's code; a KeyboardInterrupt is a Ctrl-C
 
 
-def find_law(place: str, what: str) -> Law | type:
+def find_law(given: str, what: str) -> Law | type:
     """The object that `module:object` names; `what` begins a refusal.
 
     The module is one of the working directory, or one that is installed, which goes first.
     """
-    if not all(place.partition(":")) or place.startswith("."):
+    if not all(given.partition(":")) or given.startswith("."):
         raise Refused(f"{what} is not allowed; allowed: module:object")
-    module, _, name = place.partition(":")
+    module, _, name = given.partition(":")
     if (here := str(Path.cwd())) not in sys.path:
         sys.path.append(here)  # last: a file of the user's does not take the place of a library
     try:

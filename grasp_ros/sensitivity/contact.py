@@ -173,9 +173,9 @@ def advance_body(t: Tangents, block: int, k: int, body: Body, x: Array, v: Array
     slowed = rows[Row.WAY + body, k] * load_half(own[Of.STIFFNESS], first)
     slowed = slowed + rows[Row.SPEED + body, k] * load_half(own[Of.DAMPING], first)
     held = row[Of.STIFFNESS] * inverse * x + row[Of.DAMPING] * inverse * v
-    place = BLOCK * block + STEP * (k + 1) + HALF * (velocity_lane(body) - 1)
-    store(t.series, place, share * v)
-    store(t.series, place + HALF, share * (inverse * (push + driven - slowed) - held))
+    first = BLOCK * block + STEP * (k + 1) + HALF * (velocity_lane(body) - 1)
+    store(t.series, first, share * v)
+    store(t.series, first + HALF, share * (inverse * (push + driven - slowed) - held))
 
 
 @inlined

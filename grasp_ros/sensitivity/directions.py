@@ -20,7 +20,7 @@ from grasp_ros.physics.system import PAIR_COLUMNS, System
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import build
 from grasp_ros.scene.effects.base import SIDES, Parameter
-from grasp_ros.scene.places import parameter_of, place_of
+from grasp_ros.scene.targets import parameter_of, target_of
 
 NOT_SMOOTH = {  # by the unit of a number: why no derivative is to be had
     "s": "it moves ticks, which are whole", "Hz": "its effect grows with the time; allowed: phase_rad",
@@ -57,8 +57,8 @@ def directions(scene: Scene, keys: Sequence[str], sampled: bool) -> Directions:
     forced = {force.section for force in scene.system.external} & {key.partition(".")[0] for key in keys}
     found = no_directions(len(keys), scene.ticks if forced else 0)
     for j, (key, parameter) in enumerate(zip(keys, parameters, strict=True)):
-        if place := place_of(scene, key):
-            array, row, column = place
+        if target := target_of(scene, key):
+            array, row, column = target
             rows = getattr(found, array)
             rows.reshape(len(rows), -1, len(keys))[row, column, j] = 1.0
         else:

@@ -60,8 +60,8 @@ def event_rates(scene: Scene, changes: Directions, sampled: bool, events: Array,
 def accelerations(bodies: Array, pairs: Array, moments: Moments) -> Array:
     """Accelerations (3, e) of the bodies, m/s^2."""
     push = moments.forces[:, :, 1].T.copy()
-    for body, place in COLUMN.items():
-        x, v = moments.state[:, place : place + 2].T
+    for body, column in COLUMN.items():
+        x, v = moments.state[:, column : column + 2].T
         push[body] -= bodies[body, Of.STIFFNESS] * x + bodies[body, Of.DAMPING] * v
     for side, sign in SIDES:
         force = sign * impact_force(Contact(*pairs[side]), *closing(side, moments.state))

@@ -294,6 +294,6 @@ def propagate(address: int, kind: int, span: float, s: float, unit: float, degre
     t.numbers[Number.TIME] = now + interval + (span if kind == REST else 0.0)
     pass_segment(t, kind, since_tick + interval, span, s, unit, degree)
     t.counts[Count.SLIDE], t.numbers[Number.FORCE] = t.mode[OBJECT], t.bodies[OBJECT, Of.FORCE]
-    for place in range(t.y.shape[0]):
-        t.before[place] = t.y[place]
+    for i in range(t.y.shape[0]):
+        t.before[i] = t.y[i]
     return 0

@@ -17,7 +17,7 @@ from grasp_ros.physics.layout import OBJECT, Entry, Of, Slide
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
-from grasp_ros.scene.places import check_scene
+from grasp_ros.scene.targets import check_scene
 from grasp_ros.sensitivity.directions import no_directions
 from grasp_ros.sensitivity.run import Carrier
 
@@ -41,27 +41,27 @@ def spectrum(scene: Scene, *, accuracy: float = ACCURACY) -> Array:
     check_scene(scene)
     if scene.sampled or scene.system.external:
         raise Refused(f"{scene.name}: Lyapunov exponents: allowed: continuous feedback, no external force")
-    places = [place for body in scene.system.present for place in (COLUMN[body], COLUMN[body] + 1)]
+    columns = [column for body in scene.system.present for column in (COLUMN[body], COLUMN[body] + 1)]
     bodies = scene.system.closed_loop[scene.system.present]
     rate = max(1.0 / PIECE_S, float((bodies[:, Of.DAMPING] / bodies[:, Of.MASS]).max()) / DECAY)
     pieces, before = max(math.ceil(scene.duration * rate), 1), None
     while pieces <= MOST_PIECES:
-        grown = _growth(scene, places, accuracy, pieces)
+        grown = _growth(scene, columns, accuracy, pieces)
         if grown is not None and before is not None:  # within a piece tangents may grow, and fall again
             known = min(len(grown), len(before))
             close = np.abs(grown[:known] - before[:known]) <= AGREE * np.abs(grown).max(initial=0.0)
-            lost = np.full(len(places) - known, -np.inf)
+            lost = np.full(len(columns) - known, -np.inf)
             return np.concatenate([np.where(close, before[:known] / scene.duration, np.nan), lost])
         pieces, before = 2 * pieces, grown
     raise Refused(f"{scene.name}: Lyapunov exponents: tangent vectors become nearly parallel within"
                   f" {scene.duration / MOST_PIECES:.3g} s; allowed: slower decay, or a shorter time.duration_s")
 
 
-def _growth(scene: Scene, places: list[int], accuracy: float, pieces: int) -> Array | None:
+def _growth(scene: Scene, columns: list[int], accuracy: float, pieces: int) -> Array | None:
     """Logarithms of how much tangents that are not lost grow, descending; None if one falls too far within a piece."""
-    n, piece_s = len(places), scene.duration / pieces
+    n, piece_s = len(columns), scene.duration / pieces
     start, grown = np.zeros((6, n)), np.zeros(n)
-    start[places, range(n)] = 1.0
+    start[columns, range(n)] = 1.0
     integrator = Integrator(scene.system, continuous=True, accuracy=accuracy)
     carrier = Carrier(scene, integrator, no_directions(n)._replace(state=start), np.zeros(0), False)
     stuck = False
@@ -74,13 +74,13 @@ def _growth(scene: Scene, places: list[int], accuracy: float, pieces: int) -> Ar
         slide = integrator.records.mode[OBJECT]  # FREE without dry friction
         stuck = stuck or slide == Slide.STUCK or (
             slide != Slide.FREE and bool((integrator.event_table[:, Entry.BODY] == OBJECT).any()))  # stick and slip
-        found = _at_right_angles(carrier.x[places][:, : len(grown)], stuck)
+        found = _at_right_angles(carrier.x[columns][:, : len(grown)], stuck)
         if found is None:
             return None
         kept, square, lengths = found
         grown = grown[kept] + np.log(lengths)
         carrier.x[:] = 0.0
-        carrier.x[np.ix_(places, range(len(kept)))] = square
+        carrier.x[np.ix_(columns, range(len(kept)))] = square
     return np.sort(grown)[::-1]
 
 

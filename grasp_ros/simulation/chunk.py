@@ -32,7 +32,7 @@ from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Entry, Of, Transition
 from grasp_ros.physics.layout import Outcome as Ended
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene, SceneError
-from grasp_ros.scene.places import PLACES, check_scene, parameter_of, place_of
+from grasp_ros.scene.targets import TARGETS, check_scene, parameter_of, target_of
 from grasp_ros.simulation.closed_loop import drive
 from grasp_ros.simulation.outcomes import LAST, LYAPUNOV, Outcome, Runs, find, wanted_by
 
@@ -96,8 +96,8 @@ class Variants:
 
     @cached_property
     def is_plain(self) -> bool:
-        """Whether all rows follow from arrays: changed are numbers of bodies, pairs and feedback that have a place."""
-        return all(place_of(self.scene, name) for name in self.changes)
+        """Whether all rows follow from arrays: changed are numbers of bodies, pairs and feedback that have a target."""
+        return all(target_of(self.scene, name) for name in self.changes)
 
     def faults(self) -> dict[int, str]:
         """Sentences for the rows that the scene's rules refuse."""
@@ -128,8 +128,8 @@ class Variants:
             ("bodies", system.bodies), ("pairs", system.pairs), ("state", system.state[:, None]),
             ("coulomb", np.full((1, 1), system.coulomb)), ("laws", system.law_rows))}
         for name, column in self.changes.items():
-            array, row, place = PLACES[name]
-            block[array][:, row, place] = column
+            array, row, entry = TARGETS[name]
+            block[array][:, row, entry] = column
         return block
 
     @cached_property
@@ -148,8 +148,8 @@ class Chunk(NamedTuple):
     """Outcomes of n rows."""
 
     columns: dict[str, Array]  # (n,)
-    status: np.ndarray  # (n,) places in `STATUSES`
-    stops: dict[int, str]  # why and where a row was refused or stopped, by its place among these rows
+    status: np.ndarray  # (n,) indices of `STATUSES`
+    stops: dict[int, str]  # why and where a row was refused or stopped, by its index among these rows
 
 
 def check(scene: Scene, setup: Setup | None, outcomes: Sequence[str] | None = None) -> tuple[Setup, list[Outcome]]:
@@ -191,7 +191,7 @@ def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER, m
     system = variants.scene.system
     runs.state[:, system.absent_columns] = np.nan
     runs.seen[:, [*(first + body for first in (Seen.OUTSIDE, Seen.LAST_OUTSIDE) for body in system.absent),
-                  *(first + place for first in (Seen.LOW, Seen.HIGH) for place in system.absent_columns)]] = np.nan
+                  *(first + i for first in (Seen.LOW, Seen.HIGH) for i in system.absent_columns)]] = np.nan
     found = {column.name: np.array(column.read(runs)) for column in columns}
     for name, values in found.items():
         values[status != 0 if name not in LAST else status == STATUSES.index(REFUSED)] = np.nan

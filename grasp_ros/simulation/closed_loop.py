@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from grasp_ros.exact.driver.user_controller import UserController
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.exact.records import Loop, new_place, one_interval
+from grasp_ros.exact.records import Loop, new_cursor, one_interval
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.control import FIXED, Column, ControlLaw, Law
@@ -131,7 +131,7 @@ def drive_external(scene: Scene, integrator: Integrator, grid: Array) -> Array:
     while len(block) > 1:
         ticks = np.array(block)
         outputs = outputs_within(scene, grid, ticks)
-        loop = Loop(scene.time_of(np.diff(ticks)), scene.time_of(ticks), outputs.bounds, new_place(),
+        loop = Loop(scene.time_of(np.diff(ticks)), scene.time_of(ticks), outputs.bounds, new_cursor(),
                     np.empty((len(ticks) - 1, 3)), system.external_over(ticks[:-1]))
         rows.append(integrator.run(loop, outputs.offsets))
         if integrator.status is not Status.DONE:

@@ -119,13 +119,13 @@ def complete(scene: Scene, integrator: Integrator, sampled: bool, times: Array) 
 def level_rates(system: System, changes: Directions, state: Array, rates: Array) -> Array:
     """Derivatives (m, n) of V_c at states (m, 6) with derivatives (m, 6, n); of bodies with the feedback in them."""
     gradient, explicit, weights, bodies = np.zeros_like(state), [], [], system.closed_loop
-    places = [place for body in system.present for place in (COLUMN[body], COLUMN[body] + 1)]
+    columns = [column for body in system.present for column in (COLUMN[body], COLUMN[body] + 1)]
     for body in system.present:
-        place = COLUMN[body]
-        x, v = state[:, place], state[:, place + 1]
+        column = COLUMN[body]
+        x, v = state[:, column], state[:, column + 1]
         mass, stiffness, _, force = bodies[body]
         away = force / stiffness if stiffness > 0.0 else 0.0
-        gradient[:, place], gradient[:, place + 1] = 2.0 * (stiffness * x - force), 2.0 * mass * v
+        gradient[:, column], gradient[:, column + 1] = 2.0 * (stiffness * x - force), 2.0 * mass * v
         explicit += [v * v, x * x - away * away, 2.0 * (away - x)]
         weights += [changes.bodies[body, column] for column in (Of.MASS, Of.STIFFNESS, Of.FORCE)]
     for side in system.contacts:
@@ -136,7 +136,7 @@ def level_rates(system: System, changes: Directions, state: Array, rates: Array)
         gradient[:, back] -= push
         explicit.append(2.0 * stored_energy(1.0, pressed))
         weights.append(changes.pairs[side, Law.HERTZIAN])
-    moved = np.einsum("mi,min->mn", gradient[:, places], rates[:, places])
+    moved = np.einsum("mi,min->mn", gradient[:, columns], rates[:, columns])
     return np.asarray(moved + np.stack(explicit, axis=1) @ np.array(weights))
 
 

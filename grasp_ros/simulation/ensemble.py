@@ -26,7 +26,7 @@ from grasp_ros.physics.given import names, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import opened
-from grasp_ros.scene.places import parameter_of
+from grasp_ros.scene.targets import parameter_of
 from grasp_ros.sensitivity.directions import check_keys
 from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, Variants, check, compute, has_inputs
 from grasp_ros.simulation.outcomes import BY, CORNER, OUTCOMES, V_C_END, derivatives_by

@@ -43,9 +43,9 @@ class Outcome(NamedTuple):
     read: Callable[[Runs], Array]
 
 
-def _column(name: str, place: int) -> Callable[[Runs], Array]:
+def _column(name: str, column: int) -> Callable[[Runs], Array]:
     """One column of an array of `Runs`."""
-    return lambda runs: np.asarray(getattr(runs, name)[:, place])
+    return lambda runs: np.asarray(getattr(runs, name)[:, column])
 
 
 def _settled(body: int) -> Callable[[Runs], Array]:
@@ -90,7 +90,7 @@ _GROUPS: dict[str, tuple[Outcome, ...]] = {
         Outcome(f"peak_penetration_{name}", "m", f"largest penetration of the {name} arm", Wanted.IMPACTS,
                 _peak(U.L + side)) for side, name in enumerate(SIDES)),
     "energy": tuple(
-        Outcome(name, "J", text, Wanted.LOSSES, _column("seen", place)) for name, text, place in (
+        Outcome(name, "J", text, Wanted.LOSSES, _column("seen", i)) for name, text, i in (
             ("lost_dampers", "energy that the dampers of the arms took", Seen.DAMPERS),
             ("lost_feedback", "energy that the velocity feedback took; 0 where commands are held", Seen.FEEDBACK),
             ("lost_friction", "energy that friction of the object took", Seen.FRICTION),
@@ -102,12 +102,12 @@ _GROUPS: dict[str, tuple[Outcome, ...]] = {
         Wanted.RISE, _column("seen", Seen.RISE)),),
     "extremes": tuple(
         Outcome(f"{column.name}_{which}", column.unit, f"{word} {column.text}", Wanted.MOTION,
-                _column("seen", first + place))
-        for place, column in enumerate(COLUMNS[:6])
+                _column("seen", first + i))
+        for i, column in enumerate(COLUMNS[:6])
         for which, word, first in (("min", "least", Seen.LOW), ("max", "largest", Seen.HIGH))),
     "last_state": tuple(
-        Outcome(f"{column.name}_end", column.unit, f"{column.text} at the end", NOTHING, _column("state", place))
-        for place, column in enumerate(COLUMNS[:6])),
+        Outcome(f"{column.name}_end", column.unit, f"{column.text} at the end", NOTHING, _column("state", i))
+        for i, column in enumerate(COLUMNS[:6])),
     "lyapunov": (Outcome("lyapunov", "1/s", "largest Lyapunov exponent over the run", NOTHING,
                          lambda runs: runs.growth),),
 }

@@ -52,11 +52,11 @@ def states_at(run: Trajectory, times: Array) -> Array:
     outside = times[~((times >= 0.0) & (times <= end))]
     if len(outside):
         raise Refused(f"time {float(outside[0])!r} is not allowed; allowed: 0 to {end!r} s")
-    grid, place = np.unique(np.concatenate([times.ravel(), run.t]), return_inverse=True)
+    grid, index = np.unique(np.concatenate([times.ravel(), run.t]), return_inverse=True)
     recorded = run.sampled and has_ticks(run, grid[-1:])
     states = with_commands(run, grid, integrator_of(run)) if recorded else _solved(run, grid)[0].state
     check_same(run, grid, states)
-    return np.asarray(states[place[: times.size]].reshape(*times.shape, 6))
+    return np.asarray(states[index[: times.size]].reshape(*times.shape, 6))
 
 
 def check_same(run: Trajectory, grid: Array, states: Array, events: Array | None = None) -> None:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from grasp_ros.exact.driver.user_controller import UserController
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.exact.records import Loop, new_place
+from grasp_ros.exact.records import Loop, new_cursor
 from grasp_ros.physics import given
 from grasp_ros.physics.control import ControlLaw, normals_of
-from grasp_ros.physics.layout import Answer, Place
+from grasp_ros.physics.layout import Answer, Cursor
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.observation import Observation
 from grasp_ros.physics.system import A_SYSTEM, COLUMN, System
@@ -56,7 +56,7 @@ class Outputs(NamedTuple):
         return np.arange(len(self.bounds) - 1).repeat(self.bounds[1:] - self.bounds[:-1])
 
 
-BARE = Loop(NO_TIMES, NO_TIMES, np.zeros(1, dtype=np.int64), new_place())  # answers are given
+BARE = Loop(NO_TIMES, NO_TIMES, np.zeros(1, dtype=np.int64), new_cursor())  # answers are given
 
 
 class Record(NamedTuple):
@@ -149,11 +149,11 @@ class SampledPlant:
         waits, loop = len(self._waiting), self._one
         self.effort = self._waiting[self.tick % waits].copy() if waits else commands
         loop.begins[0], loop.bounds[1], loop.answers[0] = self.time, len(times), commands
-        loop.place[:] = new_place(self.tick)
+        loop.cursor[:] = new_cursor(self.tick)
         if self._system.external:
             loop.external[:] = self._system.external_over(np.array([self.tick]))
         states = self._integrator.run(loop, times)
-        self.tick += int(loop.place[Place.INTERVAL])
+        self.tick += int(loop.cursor[Cursor.INTERVAL])
         self.inputs = loop.inputs[0].copy()
         return states
 
@@ -162,8 +162,8 @@ class SampledPlant:
         """A period under commands from outside: a graph makes each of its steps with it."""
         external = np.zeros((1, 3)) if self._system.external else BARE.external
         return Loop(
-            np.array([self._period]), np.zeros(1), np.zeros(2, dtype=np.int64), new_place(), np.zeros((1, 3)), external,
-            np.zeros((1, 3)), waiting=self._waiting,
+            np.array([self._period]), np.zeros(1), np.zeros(2, dtype=np.int64), new_cursor(),
+            np.zeros((1, 3)), external, np.zeros((1, 3)), waiting=self._waiting,
         )
 
     def follow(self, answers: Array, outputs: Outputs | None = None) -> Array:
@@ -234,12 +234,12 @@ class SampledPlant:
         ticks = np.arange(self.tick, self.tick + len(answers))
         external = self._system.external_over(ticks) if self._system.external else BARE.external
         loop = Loop(
-            np.full(count, self._period), ticks * self._period_ns / NANOSECONDS, outputs.bounds, new_place(self.tick),
+            np.full(count, self._period), ticks * self._period_ns / NANOSECONDS, outputs.bounds, new_cursor(self.tick),
             np.empty((count, 3)), external, answers, law.callee, law.laws, law.normals, self._held, self._waiting,
         )
         states = self._integrator.run(loop, outputs.offsets, rows)
-        done = int(loop.place[Place.INTERVAL])
+        done = int(loop.cursor[Cursor.INTERVAL])
         self.tick += done
-        begun = done + int(loop.place[Place.BEGUN])
-        failed = int(loop.place[Place.FAILED])
+        begun = done + int(loop.cursor[Cursor.BEGUN])
+        failed = int(loop.cursor[Cursor.FAILED])
         return Record(states, answers[: begun if count else 1], loop.inputs[:begun], failed if failed >= 0 else None)

@@ -19,7 +19,7 @@ from grasp_ros.physics.given import ascending, mapping, names, truth, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
-from grasp_ros.scene.places import check_scene
+from grasp_ros.scene.targets import check_scene
 from grasp_ros.sensitivity.directions import check_keys
 from grasp_ros.simulation.closed_loop import NO_CHANGES, Changes, check_changes, solve, wrap_controllers
 from grasp_ros.simulation.progress import Callback, showing

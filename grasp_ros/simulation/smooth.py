@@ -63,7 +63,7 @@ class Pieces(NamedTuple):
         return found
 
     def times(self, k: int, x: Array) -> Array:
-        """Times in s of places x of a piece."""
+        """Times in s of points x of a piece."""
         return np.asarray(self.begin[k] + self.length[k] * np.sin(0.25 * math.pi * (1.0 + x)) ** 2)
 
 

@@ -45,8 +45,8 @@ def _set_point(sketch: Sketch) -> None:
     for side in (0, 1):
         if draw.chance(0.6):
             own = draw.chance(0.4)
-            place = ulps(draw, sketch.x[2 * side]) if own else sketch.size * draw.between(-1.0, 1.0)
-            sketch.targets[side]["set_point_m"] = place
+            position = ulps(draw, sketch.x[2 * side]) if own else sketch.size * draw.between(-1.0, 1.0)
+            sketch.targets[side]["set_point_m"] = position
 
 
 def _feed_forward(sketch: Sketch) -> None:

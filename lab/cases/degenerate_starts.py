@@ -51,8 +51,8 @@ def ulps(draw: Draw, value: float) -> float:
 
 def _chain(sketch: Sketch) -> None:
     """All touch at rest, one of them moves."""
-    place = 0.0 if sketch.draw.chance(0.7) else sketch.size * sketch.draw.between(-1.0, 1.0)
-    sketch.x = [place] * 3
+    position = 0.0 if sketch.draw.chance(0.7) else sketch.size * sketch.draw.between(-1.0, 1.0)
+    sketch.x = [position] * 3
     who = int(sketch.draw.between(0.0, 3.0))
     sketch.v[who] = sketch.speed * sketch.draw.between(-1.0, 1.0)
 
@@ -60,8 +60,8 @@ def _chain(sketch: Sketch) -> None:
 def _rest(sketch: Sketch) -> None:
     """All move alike, touching or pressed in."""
     draw = sketch.draw
-    place = 0.0 if draw.chance(0.5) else sketch.size * draw.between(-1.0, 1.0)
-    sketch.x, sketch.v = [place] * 3, [0.0 if draw.chance(0.6) else sketch.some_speed()] * 3
+    position = 0.0 if draw.chance(0.5) else sketch.size * draw.between(-1.0, 1.0)
+    sketch.x, sketch.v = [position] * 3, [0.0 if draw.chance(0.6) else sketch.some_speed()] * 3
     if draw.chance(0.3):
         sketch.x[2 * int(draw.between(0.0, 2.0))] += sketch.size * draw.between(-1.0, 1.0)
 
@@ -69,8 +69,8 @@ def _rest(sketch: Sketch) -> None:
 def _zero_gaps(sketch: Sketch) -> None:
     """One or both gaps are zero, with any speeds."""
     draw = sketch.draw
-    place = sketch.size * draw.between(-1.0, 1.0)
-    sketch.x = [place, place, place]
+    position = sketch.size * draw.between(-1.0, 1.0)
+    sketch.x = [position, position, position]
     if draw.chance(0.5):
         side = int(draw.between(0.0, 2.0))
         sketch.x[2 * side] += (2 * side - 1) * sketch.size * draw.between(-0.1, 1.0)
@@ -80,8 +80,8 @@ def _zero_gaps(sketch: Sketch) -> None:
 def _tiny_gap(sketch: Sketch) -> None:
     """Gaps or penetrations far smaller than the scene."""
     draw = sketch.draw
-    place = 0.0 if draw.chance(0.6) else sketch.size * draw.between(-1.0, 1.0)
-    sketch.x = [place] * 3
+    position = 0.0 if draw.chance(0.6) else sketch.size * draw.between(-1.0, 1.0)
+    sketch.x = [position] * 3
     for side in (0, 1):
         gap = sketch.size * draw.decades(-18.0, -3.0, zero=0.2)
         sketch.x[2 * side] += (2 * side - 1) * (gap if draw.chance(0.8) else -gap)
@@ -119,7 +119,7 @@ def _deep(sketch: Sketch) -> None:
 
 
 def _apart(sketch: Sketch) -> None:
-    """Any places and speeds."""
+    """Any positions and speeds."""
     draw = sketch.draw
     sketch.x = [-sketch.size * draw.between(-0.02, 1.0), 0.0, sketch.size * draw.between(-0.02, 1.0)]
     sketch.v = [sketch.some_speed() for _ in range(3)]

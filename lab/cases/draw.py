@@ -58,10 +58,10 @@ def draw_ordinary(draw: Draw) -> Scene:
         mass = draw.decades(-5.0, 5.0)
         stiffness, gain = (mass * draw.decades(-4.0, 6.0, zero=0.15) for _ in range(2))
         damping, velocity = (mass * draw.decades(-6.0, 4.0, zero=0.2) for _ in range(2))
-        place = 0.0 if draw.chance(0.1) else sign * size * draw.between(-0.02, 1.0)
+        position = 0.0 if draw.chance(0.1) else sign * size * draw.between(-0.02, 1.0)
         rate = speed * draw.between(-1.0, 1.0)
         contact = Contact(draw.decades(0.0, 10.0), draw.decades(-4.0, 3.0, zero=0.2))
-        sections |= side_sections(side, Arm(mass, stiffness, damping, gain, velocity), contact, place, rate)
+        sections |= side_sections(side, Arm(mass, stiffness, damping, gain, velocity), contact, position, rate)
         slowest = max(slowest, math.sqrt((stiffness + gain) / mass))
     sections["object"] = {
         "mass_kg": draw.decades(-5.0, 5.0), "position_m": 0.0, "velocity_m_per_s": speed * draw.between(-1.0, 1.0),

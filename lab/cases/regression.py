@@ -134,10 +134,10 @@ def _size(scene: Scene, row: Sequence[Any]) -> Array:
     """
     states = np.array([scene.initial_state, [float(number) for number in row]])
     size = largest(states)
-    places = np.abs(states).max(axis=0)
+    positions = np.abs(states).max(axis=0)
     for body, rate in enumerate(rates(scene.system.closed_loop)):
         column = COLUMN[body]
-        size[column + 1] = max(size[column + 1], rate * places[column])
+        size[column + 1] = max(size[column + 1], rate * positions[column])
     return size
 
 

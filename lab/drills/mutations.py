@@ -37,21 +37,21 @@ def damage(content: bytes, rng: Random) -> bytes:
     """Some bits or bytes flipped, cut off, cut out, put in, copied or written over."""
     data = bytearray(content)
     for _ in range(int(rng.integers(1, 4))):
-        place, length = int(rng.integers(len(data) + 1)), int(rng.integers(1, 60))
+        index, length = int(rng.integers(len(data) + 1)), int(rng.integers(1, 60))
         other = rng.integers(256, size=length).astype(np.uint8).tobytes()
         match rng.integers(7):
             case 0 | 1 if data:
-                data[place % len(data)] ^= 1 << int(rng.integers(8))
+                data[index % len(data)] ^= 1 << int(rng.integers(8))
             case 2:
-                del data[place:]
+                del data[index:]
             case 3:
-                del data[place : place + length]
+                del data[index : index + length]
             case 4:
-                data[place:place] = other
+                data[index:index] = other
             case 5:
-                data[place:place] = data[place // 2 : place // 2 + length]
+                data[index:index] = data[index // 2 : index // 2 + length]
             case _:
-                data[place : place + length] = other
+                data[index : index + length] = other
     return bytes(data)
 
 
@@ -137,16 +137,16 @@ def records(content: bytes, rng: Random, unpack: Callable[[bytes], bytes]) -> by
     found = [one for one in found if one[0] in (1, 6, 12)]
     valid = list(found)
     for _ in range(int(rng.integers(1, 3))):
-        place, other = (int(k) for k in rng.integers(len(found), size=2))
+        index, other = (int(k) for k in rng.integers(len(found), size=2))
         match rng.integers(5):
             case 0:
-                found.insert(place, found[other])
+                found.insert(index, found[other])
             case 1 if len(found) > 1:
-                del found[place]
+                del found[index]
             case _:
-                opcode, body = found[place]
-                if opcode == 6 and found[place] in valid:
-                    found[place] = (opcode, _chunk(body, rng, unpack))
+                opcode, body = found[index]
+                if opcode == 6 and found[index] in valid:
+                    found[index] = (opcode, _chunk(body, rng, unpack))
     return head + b"".join(struct.pack("<BQ", opcode, len(body)) + body for opcode, body in found)
 
 
@@ -154,22 +154,22 @@ def _chunk(body: bytes, rng: Random, unpack: Callable[[bytes], bytes]) -> bytes:
     """A chunk with another content, not compressed."""
     inner = _split(unpack(body))
     for _ in range(int(rng.integers(1, 3))):
-        place, other = (int(k) for k in rng.integers(len(inner), size=2))
-        opcode, data = inner[place]
+        index, other = (int(k) for k in rng.integers(len(inner), size=2))
+        opcode, data = inner[index]
         match rng.integers(6):
             case 0:
-                inner[place] = inner[other]
+                inner[index] = inner[other]
             case 1:
-                inner[place] = opcode, damage(data, rng)
+                inner[index] = opcode, damage(data, rng)
             case 2:
-                inner[place] = int(rng.integers(20)), data
+                inner[index] = int(rng.integers(20)), data
             case 3 if len(data) >= 22:  # another time
-                inner[place] = opcode, data[:6] + struct.pack("<Q", _size(rng, 2**63)) + data[14:]
+                inner[index] = opcode, data[:6] + struct.pack("<Q", _size(rng, 2**63)) + data[14:]
             case 4:
                 at = int(rng.integers(len(data) - 3)) if len(data) > 4 else 0
-                inner[place] = opcode, data[:at] + struct.pack("<I", _size(rng, 2**32)) + data[at + 4 :]
+                inner[index] = opcode, data[:at] + struct.pack("<I", _size(rng, 2**32)) + data[at + 4 :]
             case _:
-                del inner[place]
+                del inner[index]
                 inner = inner or [(5, b"")]
     raw = b"".join(struct.pack("<BQ", opcode, len(data)) + data for opcode, data in inner)
     claimed = len(raw) if rng.integers(10) else _size(rng, 2**64)

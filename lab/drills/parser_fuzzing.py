@@ -62,12 +62,12 @@ def run(directory: Path, *, seed: int, first: int, count: int | None, seconds: f
     """
     answers: Counter[tuple[str, str]] = Counter()
     slowest, end = dict.fromkeys(["scene", "result", "bag", "journal"], 0.0), time.monotonic() + (seconds or np.inf)
-    with tempfile.TemporaryDirectory() as place, _limited(MEMORY):
-        readers = all_readers(Path(place))
+    with tempfile.TemporaryDirectory() as folder, _limited(MEMORY):
+        readers = all_readers(Path(folder))
         for number in tqdm(range(first, first + (count or 10**9)), unit="file", total=count):
             if time.monotonic() > end:
                 break
-            name, answer, took = attempt(readers, Path(place), seed, number, directory)
+            name, answer, took = attempt(readers, Path(folder), seed, number, directory)
             answers[name, answer] += 1
             slowest[name] = max(slowest[name], took)
     for name, longest in slowest.items():
@@ -77,7 +77,7 @@ def run(directory: Path, *, seed: int, first: int, count: int | None, seconds: f
     return sum(times for (_, answer), times in answers.items() if answer not in ("refused", "accepted"))
 
 
-def attempt(readers: list[Reader], place: Path, seed: int, number: int, directory: Path) -> tuple[str, str, float]:
+def attempt(readers: list[Reader], folder: Path, seed: int, number: int, directory: Path) -> tuple[str, str, float]:
     """One file: its reader, what came of it, and the seconds it took."""
     rng = np.random.default_rng([seed, number])
     reader = readers[number % len(readers)]
@@ -85,7 +85,7 @@ def attempt(readers: list[Reader], place: Path, seed: int, number: int, director
     begin = time.monotonic()
     try:
         with deadline(SECONDS):
-            reader.read(place, content)
+            reader.read(folder, content)
         answer = "accepted"
     except Refused as error:
         good = "\n" not in str(error) and 0 < len(str(error)) < LONGEST + 100
@@ -102,21 +102,21 @@ def attempt(readers: list[Reader], place: Path, seed: int, number: int, director
     return reader.name, answer, time.monotonic() - begin
 
 
-def all_readers(place: Path) -> list[Reader]:
+def all_readers(folder: Path) -> list[Reader]:
     """The readers, with valid files to damage."""
     library = [scenes.load(name).to_yaml() for name in scenes.names()]
     simulate(scenes.load("preload", SQUEEZED), max_work=FEW_WORK)  # compiles what is compiled at first use
     case = scenes.load("case_01", ["time.duration_s=0.004"])
     result, recorded = simulate(case, grid=np.linspace(0.0, 0.004, 5)), simulate(case, sampled=True)
-    result.save(place / "valid.npz")
-    recorder.write(place / "valid", recorded)
-    whole, packed = (place / "valid" / "valid.mcap").read_bytes(), (place / "valid.npz").read_bytes()
-    with np.load(place / "valid.npz") as data:
+    result.save(folder / "valid.npz")
+    recorder.write(folder / "valid", recorded)
+    whole, packed = (folder / "valid" / "valid.mcap").read_bytes(), (folder / "valid.npz").read_bytes()
+    with np.load(folder / "valid.npz") as data:
         content = dict(data)
     return [
         Reader("scene", partial(_make_scene, library), _read_scene),
         Reader("result", partial(_make_result, packed, content), partial(_read_result, result)),
-        Reader("bag", partial(_make_bag, whole, (place / "valid" / "metadata.yaml").read_bytes()),
+        Reader("bag", partial(_make_bag, whole, (folder / "valid" / "metadata.yaml").read_bytes()),
              partial(_read_bag, recorded, whole)),
         Reader("journal", _make_line, _read_journal),
     ]
@@ -145,9 +145,9 @@ def _make_scene(library: list[str], rng: Random) -> bytes:
             return mutations.text(text, rng).encode("utf-8", "surrogatepass")
 
 
-def _read_scene(place: Path, content: bytes) -> None:
+def _read_scene(folder: Path, content: bytes) -> None:
     """What is accepted has the numbers that another reader finds, keeps them when written, and can be used."""
-    path = place / "scene.yaml"
+    path = folder / "scene.yaml"
     path.write_bytes(content)
     scene = scenes.load(str(path))
     other = YAML(typ="safe", pure=True).load(content.decode())
@@ -173,9 +173,9 @@ def _make_result(packed: bytes, content: dict[str, np.ndarray], rng: Random) -> 
     return mutations.damage(packed, rng) if rng.integers(2) else mutations.arrays(content, rng)
 
 
-def _read_result(right: Trajectory, place: Path, content: bytes) -> None:
+def _read_result(right: Trajectory, folder: Path, content: bytes) -> None:
     """What is accepted is what was there before the damage."""
-    path = place / "result.npz"
+    path = folder / "result.npz"
     path.write_bytes(content)
     found = simulation.load(path)
     if found.scene != right.scene or any(
@@ -202,9 +202,9 @@ def _joined(metadata: bytes, storage: bytes) -> bytes:
     return len(metadata).to_bytes(4, "little") + metadata + storage
 
 
-def _read_bag(right: Trajectory, whole: bytes, place: Path, content: bytes) -> None:
+def _read_bag(right: Trajectory, whole: bytes, folder: Path, content: bytes) -> None:
     """What is accepted has the states that were recorded, and all of them if it says that it was closed."""
-    path, kind, size = place / "bag", content[:1], int.from_bytes(content[1:5], "little")
+    path, kind, size = folder / "bag", content[:1], int.from_bytes(content[1:5], "little")
     path.mkdir(exist_ok=True)
     metadata, storage = content[5 : 5 + size], content[5 + size :]
     (path / "bag.mcap").write_bytes(storage)
@@ -215,7 +215,7 @@ def _read_bag(right: Trajectory, whole: bytes, place: Path, content: bytes) -> N
         found = bag.read(path)
     except Refused:
         if len(content) % 8 == 0:
-            _recover(right, kind, path, place)
+            _recover(right, kind, path, folder)
         raise
     if kind == b"r":  # with checksums of its own
         if (np.diff(found.tick) <= 0).any() or found.tick[-1] > found.scene.ticks:
@@ -227,9 +227,9 @@ def _read_bag(right: Trajectory, whole: bytes, place: Path, content: bytes) -> N
         raise Broken("its states are others")
 
 
-def _recover(right: Trajectory, kind: bytes, path: Path, place: Path) -> None:
+def _recover(right: Trajectory, kind: bytes, path: Path, folder: Path) -> None:
     """What is recovered was recorded."""
-    with tempfile.TemporaryDirectory(dir=place) as new:
+    with tempfile.TemporaryDirectory(dir=folder) as new:
         recover(path, Path(new) / "new")
         found = bag.read(Path(new) / "new")
     if kind != b"r" and found.state.tobytes() != right.state[found.tick].tobytes():
@@ -252,10 +252,10 @@ def _make_line(rng: Random) -> bytes:
     return mutations.damage((json.dumps({**entry, "sum": _seal(entry)}) + "\n").encode(), rng)
 
 
-def _read_journal(place: Path, content: bytes) -> None:
+def _read_journal(folder: Path, content: bytes) -> None:
     """What is accepted is a record."""
-    (place / "journal.jsonl").write_bytes(content)
-    found = Journal(place).get("a", Record)
+    (folder / "journal.jsonl").write_bytes(content)
+    found = Journal(folder).get("a", Record)
     if found is not None:
         found.missed, found.time, found.good  # noqa: B018 - can be computed
         if not isinstance(found.setting, (int, float)) or not isinstance(found.there_are, tuple):

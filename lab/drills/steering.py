@@ -254,16 +254,16 @@ def run(scene: Scene, calls: int, seed: int) -> bool:
     scene = scene.changed({"time.duration_s": SECONDS})
     os.environ.setdefault(RANGE, LOCALHOST)  # before rclpy looks
     with tempfile.TemporaryDirectory() as directory:
-        place = Path(directory) / "run"
+        folder = Path(directory) / "run"
         begin = time.monotonic()
         try:
-            with steered(scene, place) as plant:
+            with steered(scene, folder) as plant:
                 done = steer(plant, calls, seed, quiet=False)
         except Wrong as error:
             print(f"{scene.title}, seed {seed}: {error}")
             return False
         seconds, lengths = time.monotonic() - begin, [*plant.lengths, plant.tick + 1]
-        found = problems(place / "bag", lengths)
+        found = problems(folder / "bag", lengths)
     print(f"{scene.title}: {calls} random calls, seed {seed}, {seconds:.0f} s: every status as promised")
     print(", ".join(f"{name} {number}" for name, number in sorted(done.items())))
     print(f"bag: {len(lengths)} runs, {sum(lengths)} states: " + (

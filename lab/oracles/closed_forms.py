@@ -230,11 +230,11 @@ def balance(system: System, duration: float, events: Sequence[float], solve: Cal
     momentum: Array = np.zeros(len(at_edges))
     force: Array = np.zeros(inside.shape[:2])
     scale = 0.0
-    places, speeds = ([COLUMN[body] + part for body in system.present] for part in (0, 1))
-    farthest, fastest = float(np.abs(at_edges[:, places]).max()), float(np.abs(at_edges[:, speeds]).max())
+    positions, speeds = ([COLUMN[body] + part for body in system.present] for part in (0, 1))
+    farthest, fastest = float(np.abs(at_edges[:, positions]).max()), float(np.abs(at_edges[:, speeds]).max())
     for body in system.present:
-        place = at_edges[:, COLUMN[body]], at_edges[:, COLUMN[body] + 1]
-        momentum = momentum + bodies[body, Of.MASS] * place[1] + bodies[body, Of.DAMPING] * place[0]
+        motion = at_edges[:, COLUMN[body]], at_edges[:, COLUMN[body] + 1]
+        momentum = momentum + bodies[body, Of.MASS] * motion[1] + bodies[body, Of.DAMPING] * motion[0]
         force = force + bodies[body, Of.STIFFNESS] * inside[..., COLUMN[body]] - bodies[body, Of.FORCE]
         scale = max(scale, bodies[body, Of.MASS] * fastest, bodies[body, Of.DAMPING] * farthest)
     pushed = integral(force)

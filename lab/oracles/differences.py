@@ -102,7 +102,7 @@ def _run(scene: Scene) -> Trajectory:
 
 
 def _spread(scene: Scene, key: str, rates: Array) -> Array:
-    """How much the derivatives (6,) change where the places are one rounding off."""
+    """How much the derivatives (6,) change where the positions are one rounding off."""
     off, found = np.spacing(np.abs(scene.initial_state[::2]).max()), [rates]
     for way in (-off, off):
         with suppress(SceneError):

@@ -100,9 +100,9 @@ def _momentum(detail: Detail, size: Sizes) -> tuple[Array, Array, Array]:
     mass, stiffness, damping, force = np.moveaxis(detail.bodies, -1, 0)
     x, v = detail.x, detail.v
     span = (detail.pieces.end - detail.pieces.begin)[:, None]
-    place, doubt = detail.integral(x)
+    moved, doubt = detail.integral(x)
     way, lag = detail.integral(v)
-    change = mass * (v[:, -1] - v[:, 0]) + damping * way + stiffness * place - force * span
+    change = mass * (v[:, -1] - v[:, 0]) + damping * way + stiffness * moved - force * span
     late = EPS * detail.pieces.end[:, None]
     acting = np.abs(stiffness)[:, None] * np.abs(x) + np.abs(damping)[:, None] * np.abs(v) + np.abs(force)[:, None]
     acting[..., OBJECT] += detail.run.scene.system.coulomb

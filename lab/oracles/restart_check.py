@@ -31,7 +31,7 @@ from lab.oracles.rounding_bounds import (
     sizes,
     walk,
 )
-from lab.oracles.segments import FIRST, LAST, PLACES, Detail
+from lab.oracles.segments import COLUMNS, FIRST, LAST, Detail
 from lab.reference.deadline import Deadline, deadline
 
 NUDGE = 2.0**-46  # of the size of a state
@@ -110,7 +110,7 @@ def _slowing(bodies: Array) -> Array:
 def _rows(x: Array, v: Array) -> Array:
     """States (n, 6) of positions and velocities (..., 3) by body."""
     states = np.empty((x.size // 3, 6))
-    states[:, PLACES], states[:, np.array(PLACES) + 1] = x.reshape(-1, 3), v.reshape(-1, 3)
+    states[:, COLUMNS], states[:, np.array(COLUMNS) + 1] = x.reshape(-1, 3), v.reshape(-1, 3)
     return states
 
 

@@ -28,11 +28,11 @@ CUTS, CUT, PARTS = 12, 0.1, 8  # levels, their grading, and equal parts of a pie
 SHORTEST = 64.0 * EPS  # of a piece, relative to its time: nodes must differ
 INNER, FIRST, LAST, WHOLE = range(4)  # which ends of a piece are ends of its segment
 Part = tuple[float, float, int, int]  # begin, end, kind and segment of a piece
-PLACES = [COLUMN[body] for body in (LEFT, RIGHT, OBJECT)]
+COLUMNS = [COLUMN[body] for body in (LEFT, RIGHT, OBJECT)]
 
 
 class Rule(NamedTuple):
-    """A quadrature over [0, 1] by the place of a piece in its segment; u^(3/2) is analytic in s at the ends."""
+    """A quadrature over [0, 1] by the part of a piece in its segment; u^(3/2) is analytic in s at the ends."""
 
     nodes: Array  # (4, n)
     weights: Array  # (4, n)
@@ -54,7 +54,7 @@ class Pieces(NamedTuple):
 
 
 class Detail(NamedTuple):
-    """A run with its states in pieces; bodies are LEFT, RIGHT, OBJECT, each place 0 and -1 of x and v an end."""
+    """A run with its states in pieces; bodies are LEFT, RIGHT, OBJECT, each index 0 and -1 of x and v an end."""
 
     run: Trajectory
     pieces: Pieces
@@ -175,6 +175,6 @@ def detail(run: Trajectory, pieces: Pieces, grid: Array) -> Detail:
     elif system.external:
         ticks = tick_of(run.scene, 0.5 * (pieces.begin + pieces.end)).tolist()
         acting[..., Of.FORCE] += np.array([system.external_at(tick) for tick in ticks]).reshape(-1, 3)
-    places = np.array(PLACES)
+    columns = np.array(COLUMNS)
     weights = np.array([rule().weights, *rule().coarse])[:, pieces.kind] * (pieces.end - pieces.begin)[:, None]
-    return Detail(run, pieces, weights, grid, states[..., places], states[..., places + 1], acting)
+    return Detail(run, pieces, weights, grid, states[..., columns], states[..., columns + 1], acting)

@@ -22,7 +22,7 @@ class Start(NamedTuple):
     x_o: float = 0.0
 
 
-PLACES = "left_arm.position_m", "right_arm.position_m", "object.position_m"  # keys of a start
+POSITIONS = "left_arm.position_m", "right_arm.position_m", "object.position_m"  # keys of a start
 STANDARD = 1
 NUMBERS = tuple(range(1, 12))
 PRINTED = Start(-0.3, 0.5)
@@ -110,7 +110,7 @@ def started(scene: Scene, start: Start) -> Scene:
     """A scene that begins at rest somewhere else; each is made once, because comparisons ask for the same ones."""
     key = scene.name, text_of(scene), start
     if key not in _STARTED:
-        _STARTED[key] = scene.changed(dict(zip(PLACES, start, strict=True)))
+        _STARTED[key] = scene.changed(dict(zip(POSITIONS, start, strict=True)))
     return _STARTED[key]
 
 

@@ -1,4 +1,4 @@
-"""Equations (16) to (37): V in the four conditions of contact, its rate, its parts, and the place of the object."""
+"""Equations (16) to (37): V in the four conditions of contact, its rate, its parts, and the position of the object."""
 
 from __future__ import annotations
 

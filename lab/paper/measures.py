@@ -15,7 +15,7 @@ from grasp_ros.simulation import simulate
 from grasp_ros.simulation.chunk import HORIZONS, SETTLED, Setup
 from grasp_ros.simulation.ensemble import ensemble
 from grasp_ros.simulation.quantities import settled_distance
-from lab.paper.cases import OFFSETS, PLACES, Start, start_of, started, text_of, value_of
+from lab.paper.cases import OFFSETS, POSITIONS, Start, start_of, started, text_of, value_of
 
 STRETCH = 20.0  # s, the paper's time axis
 SAMPLE = 4e-3  # s, of means and of changes of a sign
@@ -85,7 +85,7 @@ def _measured(scene: Scene, starts: Sequence[Start], kind: str) -> Sequence[Any]
     if kind == _MOTION:
         return [_motion(started(scene, start)) for start in starts]
     outcome, bound = ("settling_time", BOUNDS[kind]) if kind in BOUNDS else ("peak_input", SETTLED)
-    rows = {key: values for key, *values in zip(PLACES, *starts, strict=True) if key.split(".")[0] in scene.values}
+    rows = {key: values for key, *values in zip(POSITIONS, *starts, strict=True) if key.split(".")[0] in scene.values}
     found = ensemble(scene, rows, (outcome,), setup=Setup(horizons=HORIZONS, settled=bound))
     if not found.done.all():
         raise RuntimeError(f"{scene.name}: {next(iter(found.stops.values()))}")

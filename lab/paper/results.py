@@ -42,9 +42,9 @@ def _gap(found: Gap) -> Table:
 
 def _tail(found: Tail) -> Table:
     decades = [int(np.argmin(np.abs(found.t - 10.0**power))) for power in range(2, 6)]
-    return [{"t, s": f"{found.t[place]:.3g}", "V_c, J": f"{found.V_c[place]:.3e}",
-             "V_c / law": f"{found.V_c[place] / found.law[place]:.4f}", "touches": f"{found.contacts[place]:.0f}"}
-            for place in dict.fromkeys(decades)]
+    return [{"t, s": f"{found.t[i]:.3g}", "V_c, J": f"{found.V_c[i]:.3e}",
+             "V_c / law": f"{found.V_c[i] / found.law[i]:.4f}", "touches": f"{found.contacts[i]:.0f}"}
+            for i in dict.fromkeys(decades)]
 
 
 def _chaos(found: Chaos) -> Table:

@@ -16,18 +16,18 @@ from lab.reference.grasp import grasp_of
 
 STEP = 2e-4  # s, of the differences
 STENCIL = np.array([1.0 / 280.0, -4.0 / 105.0, 0.2, -0.8, 0.0, 0.8, -0.2, 4.0 / 105.0, -1.0 / 280.0])  # order 8
-PLACES = 12  # in each stretch between two events
+POINTS = 12  # in each stretch between two events
 
 
 class Sample:
-    """One motion, at places between its events, with the derivatives of everything."""
+    """One motion, at points between its events, with the derivatives of everything."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.system, self.grasp = scene, scene.system, grasp_of(scene)
         self.run = simulate(scene)
         edges = np.unique(np.concatenate([[0.0], self.run.event_table[:, 0], [scene.duration]]))
         reach = 4.0 * STEP
-        times = [np.linspace(a + 2 * reach, b - 2 * reach, PLACES) for a, b in pairwise(edges) if b - a > 20.0 * reach]
+        times = [np.linspace(a + 2 * reach, b - 2 * reach, POINTS) for a, b in pairwise(edges) if b - a > 20.0 * reach]
         self.t: Array = np.concatenate(times)
         grid = (self.t[:, None] + STEP * np.arange(-4, 5)).ravel()
         order = np.argsort(grid, kind="stable")  # in a short contact the stencils overlap
@@ -45,7 +45,7 @@ class Sample:
 
     @cached_property
     def level(self) -> Energy:
-        """V, V_c, V' at the places."""
+        """V, V_c, V' at the points."""
         return energy(self.system, self.state)
 
     @cached_property
@@ -59,7 +59,7 @@ class Sample:
         return float(np.abs(self.level.V_rate).max()) or 1.0
 
     def differentiated(self, values: Array) -> Array:
-        """The derivative at each place of what is known on the stencils, (n, 9) or (m, 9)."""
+        """The derivative at each point of what is known on the stencils, (n, 9) or (m, 9)."""
         return np.asarray(values @ STENCIL / STEP)
 
     def pair(self, side: int) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""Polynomials: their values, their sizes, and the first place where one becomes negative."""
+"""Polynomials: their values, their sizes, and the first point where one becomes negative."""
 
 from __future__ import annotations
 

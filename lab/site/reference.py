@@ -43,10 +43,10 @@ def python() -> str:
     for name, listed in PUBLIC.items():
         module = importlib.import_module(name)
         things = {member: getattr(module, member) for member in listed or module.__all__}
-        places = [f"{thing.__module__}.{thing.__qualname__}" for thing in things.values()
+        names = [f"{thing.__module__}.{thing.__qualname__}" for thing in things.values()
                   if inspect.isclass(thing) or inspect.isfunction(thing)]
-        fresh = [f"::: {place}" for place in places if place not in known]
-        known.update(places)
+        fresh = [f"::: {place}" for place in names if place not in known]
+        known.update(names)
         parts += [f"## {name}", str(module.__doc__).split("\n", 1)[0], _names(name, things), *fresh] if fresh else []
     return "\n\n".join(parts)
 

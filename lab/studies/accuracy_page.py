@@ -52,9 +52,9 @@ def run(docs: Path | None, directory: Path, quick: bool) -> None:
         If a directory cannot be written.
     """
     docs = docs or directory
-    place = docs / "accuracy"
-    with writing(place):
-        place.mkdir(parents=True, exist_ok=True)
+    folder = docs / "accuracy"
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
     subjects = accuracy.default_scenes()
     case = scenes.load(LOOP_SCENE)
     if quick:
@@ -67,13 +67,13 @@ def run(docs: Path | None, directory: Path, quick: bool) -> None:
     limits = stability.limits(arm)
     points = loop.run(case, directory, () if quick else loop.GRAPH_PERIODS_MS)
 
-    write_records(records, place / "records.csv")
-    figures.work_precision(records, accuracy.METRIC, place / "error_against_time.png")
-    figures.contacts_missed(records, place / "contacts_missed.png")
-    figures.energy_drift(drifts, place / "energy_drift.png")
-    figures.prediction(predictions, place / "prediction.png")
-    figures.control_period(points, case.name, place / "control_period.png")
-    figures.stability(arm, limits, place / "stability.png")
+    write_records(records, folder / "records.csv")
+    figures.work_precision(records, accuracy.METRIC, folder / "error_against_time.png")
+    figures.contacts_missed(records, folder / "contacts_missed.png")
+    figures.energy_drift(drifts, folder / "energy_drift.png")
+    figures.prediction(predictions, folder / "prediction.png")
+    figures.control_period(points, case.name, folder / "control_period.png")
+    figures.stability(arm, limits, folder / "stability.png")
     pages.write(
         docs, "accuracy", metric=accuracy.METRIC, points=simulation.GRID_POINTS, **accuracy_rows.by_error(records),
         drift=accuracy_rows.drift(drifts), prediction=accuracy_rows.prediction(predictions),

@@ -39,13 +39,13 @@ class Family(NamedTuple):
     """A set of starts at rest with the arms of Table 1: a box of numbers in which the smallest p is looked for."""
 
     text: str
-    low: tuple[float, ...]  # -x_l, x_r in m, place of the object between the arms in [0, 1], log10 m_o, log10 H
+    low: tuple[float, ...]  # -x_l, x_r in m, position of the object between the arms in [0, 1], log10 m_o, log10 H
     high: tuple[float, ...]
     part: float  # least height of a jump that counts, in V(0)
 
-    def start(self, place: Array) -> tuple[Array, float, float]:
-        """State, object's mass and H of a point of the box; NaN for the object's place means x_o = 0."""
-        x_l, x_r, between, mass, hertzian = place
+    def start(self, point: Array) -> tuple[Array, float, float]:
+        """State, object's mass and H of a point of the box; NaN for the object's position means x_o = 0."""
+        x_l, x_r, between, mass, hertzian = point
         x_o = 0.0 if math.isnan(between) else -x_l + between * (x_l + x_r)
         return np.array([-x_l, 0.0, x_o, 0.0, x_r, 0.0]), 10.0**mass, 10.0**hertzian
 
@@ -101,13 +101,13 @@ class Found(NamedTuple):
     """The smallest p that a search has found, and where."""
 
     p: float  # s/m
-    place: Array
+    point: Array
     jump: Jump
 
 
-def highest_jump(family: Family, place: Array, p: float) -> Jump | None:
+def highest_jump(family: Family, point: Array, p: float) -> Jump | None:
     """The highest jump of a start of the family, if it counts."""
-    start, mass, hertzian = family.start(place)
+    start, mass, hertzian = family.start(point)
     found = jumps(system_of(table_one(p, mass, hertzian), start), HORIZON)
     level = 15.0 * (start[0] ** 2 + start[4] ** 2)  # V(0) at rest
     best = max(found, key=lambda jump: jump.height, default=None)
@@ -128,19 +128,19 @@ def search(family: Family, draws: int, steps: int, seed: int) -> Found:
     low, high = np.array(family.low), np.array(family.high)
     best: Found | None = None
     for _ in tqdm(range(draws), desc="draws", file=sys.stderr, leave=False):
-        place = low + rng.random(5) * (high - low)
+        point = low + rng.random(5) * (high - low)
         p = float(np.exp(rng.uniform(math.log(SMALLEST_P), math.log(LARGEST_P))))
-        if (best is None or p < best.p) and (jump := highest_jump(family, place, p)):
-            best = Found(p, place, jump)
+        if (best is None or p < best.p) and (jump := highest_jump(family, point, p)):
+            best = Found(p, point, jump)
     if best is None:
         raise ValueError(f"{family.text}: no jump found in {draws} draws")
     width = 0.3
     for _ in tqdm(range(steps), desc="steps", file=sys.stderr, leave=False):
-        place = np.minimum(np.maximum(best.place + width * rng.standard_normal(5) * (high - low), low), high)
+        point = np.minimum(np.maximum(best.point + width * rng.standard_normal(5) * (high - low), low), high)
         p = best.p * (1.0 - 0.2 * width * float(rng.random()))
-        jump = highest_jump(family, place, p)
+        jump = highest_jump(family, point, p)
         if jump is not None:
-            best = Found(p, place, jump)
+            best = Found(p, point, jump)
         width = max(0.995 * width, 1e-7) if jump is None else min(1.3 * width, 0.5)
     return best
 
@@ -177,8 +177,8 @@ def smallest_rows(draws: int, steps: int) -> list[list[str]]:
     """The smallest p that was found in each family."""
     rows = []
     for family in families():
-        p, place, jump = search(family, draws, steps, SEED)
-        start, mass, hertzian = family.start(place)
+        p, point, jump = search(family, draws, steps, SEED)
+        start, mass, hertzian = family.start(point)
         widest = np.array([-AMPLITUDE, 0.0, 0.0, 0.0, AMPLITUDE, 0.0])
         safe = safe_p(table_one(p, 10.0 ** family.low[3], hertzian), widest)
         rows.append([family.text, f"{family.part:g}", f"{p:.4f}", ", ".join(f"{x:.5f}" for x in start[0::2]),

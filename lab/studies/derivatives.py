@@ -27,7 +27,7 @@ SUBJECTS = (
 )
 PARTS = (0.25, 0.5, 1.0)  # of the horizon
 SECONDS = {"delay": 3.0}  # horizons of scenes with many ticks, which take the reference long
-ROUNDINGS = 4  # runs whose initial places are off by one
+ROUNDINGS = 4  # runs whose initial positions are off by one
 PAGE = "derivatives.md"
 REFERENCE, RANDOM, PEERS, COST = TABLES = "reference", "random", "peers", "cost"
 
@@ -72,10 +72,10 @@ def _derivative(scene: Scene, key: str, times: Array) -> Array:
 
 
 def _off(scene: Scene, signs: Array) -> Scene:
-    """The scene with initial places that are one rounding of the largest of them off."""
+    """The scene with initial positions that are one rounding of the largest of them off."""
     off = signs * np.spacing(np.abs(scene.initial_state).max())
-    places = zip(("left_arm", "object", "right_arm"), off.tolist(), strict=True)
-    return scene.changed({f"{body}.position_m": scene.values[body]["position_m"] + way for body, way in places})
+    positions = zip(("left_arm", "object", "right_arm"), off.tolist(), strict=True)
+    return scene.changed({f"{body}.position_m": scene.values[body]["position_m"] + way for body, way in positions})
 
 
 def random_scenes(decided: int) -> str:

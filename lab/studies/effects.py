@@ -21,7 +21,7 @@ from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator
-from grasp_ros.exact.records import Integers, Loop, new_place
+from grasp_ros.exact.records import Integers, Loop, new_cursor
 from grasp_ros.physics.layout import Kind, Work
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
@@ -154,7 +154,7 @@ def physics_of(scene: Scene) -> Callable[[], Array]:
 
     def again() -> Array:
         integrator = Integrator(scene.system, continuous=False)
-        integrator.run(Loop(lengths, times, bounds, new_place(), np.empty_like(inputs), inputs), np.zeros(0))
+        integrator.run(Loop(lengths, times, bounds, new_cursor(), np.empty_like(inputs), inputs), np.zeros(0))
         return integrator.state
 
     return again

@@ -21,8 +21,8 @@ SPEED = re.compile(r"(\d+(?:\.\d+)?) ticks/s")
 def our_speed(scene: Scene) -> float:
     """Ticks per second of the whole graph with physics, monitor and bag."""
     with tempfile.TemporaryDirectory() as directory:
-        place = Path(directory) / "run"
-        graph = Graph(scene, place, ACCURACY, errors=subprocess.PIPE)
+        folder = Path(directory) / "run"
+        graph = Graph(scene, folder, ACCURACY, errors=subprocess.PIPE)
         graph.start()
         try:
             graph.wait([])

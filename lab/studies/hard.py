@@ -110,8 +110,8 @@ def counts(rows: Sequence[Row], others: int) -> dict[str, list[Counter[str] | No
     for name, members in _members(rows).items():
         asked = [row for row in members if row.others]
         found[name] = [Counter(_outcome(row.own, row.case) for row in members)]
-        found[name] += [Counter(_outcome(row.others[place], row.case) for row in asked) if asked else None
-                        for place in range(others)]
+        found[name] += [Counter(_outcome(row.others[i], row.case) for row in asked) if asked else None
+                        for i in range(others)]
     return found
 
 
@@ -130,8 +130,8 @@ def _compared(others: Sequence[Other], rows: Sequence[Row]) -> list[list[str]]:
     """For each other method how many cases it has within our bounds, and how many it does not do at all."""
     compared = [row for row in rows if row.others]
     found = []
-    for place, other in enumerate(others):
-        theirs = [(row.others[place], row.case) for row in compared]
+    for i, other in enumerate(others):
+        theirs = [(row.others[i], row.case) for row in compared]
         lost = sum(verdict.error is None or not verdict.error < FAR for verdict, _ in theirs)
         found.append([f"`{other.name}`", str(len(compared)), str(sum(one.right(case) for one, case in theirs)),
                       str(lost)])

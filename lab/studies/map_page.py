@@ -28,16 +28,16 @@ def run(docs: Path | None, directory: Path, quick: bool) -> None:
         If a directory cannot be written.
     """
     docs = docs or directory
-    place = docs / "maps"
-    with writing(place):
-        place.mkdir(parents=True, exist_ok=True)
+    folder = docs / "maps"
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
         directory.mkdir(parents=True, exist_ok=True)
     settled = maps.settling(directory, 24 if quick else maps.PIXELS)
     limits = maps.limits(*((6, 5) if quick else ()))
     plan, data, seconds = maps.robustness(directory, 64 if quick else maps.SAMPLE)
-    map_figures.settling(settled, place / "settling.png")
-    map_figures.limits(limits, place / "limits.png")
-    figures.draw(data, plan, "settling_time", place / "robustness.png")
+    map_figures.settling(settled, folder / "settling.png")
+    map_figures.limits(limits, folder / "limits.png")
+    figures.draw(data, plan, "settling_time", folder / "robustness.png")
     pages.write(docs, "maps", maps=maps, found=settled, map=_map(settled), loops=limits.loops, plan=plan,
                 sample=_sample(plan, data), seconds=seconds)
 

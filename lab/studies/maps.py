@@ -104,7 +104,7 @@ def _window(plan: Plan, jumps: Array, size: int, pixels: int) -> tuple[Axis, Axi
         (i, j): jumps[i : i + size, j : j + size].sum()
         for i in range(0, jumps.shape[0] - size + 1, size // 2) for j in range(0, jumps.shape[1] - size + 1, size // 2)
     }
-    i, j = max(counts, key=lambda place: counts[place])
+    i, j = max(counts, key=lambda cell: counts[cell])
     y, x = plan.axes
     return (Axis(y.name, float(y.values[i]), float(y.values[i + size - 1]), pixels, True),
             Axis(x.name, float(x.values[j]), float(x.values[j + size - 1]), pixels))

@@ -37,8 +37,8 @@ def hard_cases(rows: Mapping[str, Sequence[Counter[str] | None]], solvers: Seque
     """Draw how many cases of each family each solver keeps, breaks, or has no result of; None: it was not asked."""
     size = (2.2 + 2.6 * len(solvers), 0.33 * len(rows) + 1.2)
     figure, panels = canvas.subplots(1, len(solvers), sharey=True, squeeze=False, figsize=size)
-    for place, (axes, solver) in enumerate(zip(panels[0], solvers, strict=True)):
-        for row, counts in enumerate(each[place] for each in rows.values()):
+    for column, (axes, solver) in enumerate(zip(panels[0], solvers, strict=True)):
+        for row, counts in enumerate(each[column] for each in rows.values()):
             _outcomes(axes, row, counts)
         axes.set_xlim(0.0, 1.0)
         axes.set_xticks([])

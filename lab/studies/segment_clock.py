@@ -14,7 +14,7 @@ from grasp_ros.exact.records import Integers, Tables
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
 
-COUNT, FIRST = 2, 3  # places, behind the seconds and nanoseconds of the clock; from the last on kind and time in turn
+COUNT, FIRST = 2, 3  # indices, behind the seconds and nanoseconds of the clock; from the last on kind and time in turn
 MONOTONIC = time.CLOCK_MONOTONIC
 clock_gettime = ctypes.CDLL(None).clock_gettime
 clock_gettime.argtypes = ctypes.c_int, ctypes.c_size_t
@@ -23,7 +23,7 @@ clock_gettime.argtypes = ctypes.c_int, ctypes.c_size_t
 class Clock(NamedTuple):
     """What it is called with."""
 
-    places: Integers  # (FIRST + 2 n,)
+    numbers: Integers  # (FIRST + 2 n,)
 
 
 clock_at = reader(typeof(Clock(np.zeros(0, dtype=np.int64))))
@@ -32,11 +32,11 @@ clock_at = reader(typeof(Clock(np.zeros(0, dtype=np.int64))))
 @cfunc(SIGNATURE)  # type: ignore[untyped-decorator]
 def read_clock(context: int, kind: int, t: float, s: float, unit: float, degree: int) -> int:
     """Note the kind of a segment, and when it was over."""
-    place = clock_at(context).places
-    clock_gettime(MONOTONIC, place.ctypes.data)
-    row = FIRST + 2 * place[COUNT]
-    place[row], place[row + 1] = kind, place[0] * NANOSECONDS + place[1]
-    place[COUNT] += 1
+    numbers = clock_at(context).numbers
+    clock_gettime(MONOTONIC, numbers.ctypes.data)
+    row = FIRST + 2 * numbers[COUNT]
+    numbers[row], numbers[row + 1] = kind, numbers[0] * NANOSECONDS + numbers[1]
+    numbers[COUNT] += 1
     return 0
 
 

@@ -27,7 +27,7 @@ from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Of, Pair,
 from grasp_ros.physics.model import Contact, impact_force
 
 TOLERANCE, ORDER = 1e-16, 34
-DRAWS, PLACES = (400, 100) if COMPILED else (8, 12)
+DRAWS, POINTS = (400, 100) if COMPILED else (8, 12)
 
 
 def held(random: np.random.Generator) -> tuple[Plant, State]:
@@ -59,7 +59,7 @@ def push_at(tables: Tables, plant: Plant, state: State, n: int, s: float) -> flo
 
 def pushes(tables: Tables, plant: Plant, state: State, n: int, h: float) -> Array:
     """The same at many places."""
-    return np.array([push_at(tables, plant, state, n, s) for s in np.linspace(0.0, h, PLACES)])
+    return np.array([push_at(tables, plant, state, n, s) for s in np.linspace(0.0, h, POINTS)])
 
 
 @SIDES
@@ -137,7 +137,7 @@ def test_a_stuck_object_slips_where_the_impacts_overcome_the_friction(part: floa
                 assert found.when < 1e-20 * h
                 continue
             assert abs(push) == pytest.approx(coulomb, rel=1e-10)
-            assert (along[np.linspace(0.0, h, PLACES) < found.when] <= coulomb * (1.0 + 1e-10)).all()
+            assert (along[np.linspace(0.0, h, POINTS) < found.when] <= coulomb * (1.0 + 1e-10)).all()
             slips += 1
     assert slips > 0.1 * DRAWS
 

@@ -18,7 +18,7 @@ DOORS = {"advance": 16}  # blocks of numbers, see its docstring
 # The recurrences of `series` are written out for the compiler's vectors; a test by Picard iteration watches them.
 ROOM = sorted(Path(exact.__file__).parent.rglob("*.py"))
 FILES = [path for path in ROOM if path.name != "series.py"]
-NAMED = {"work", "filled", "mode", "rows", "bodies", "given", "pairs", "y"}  # arrays whose places have names
+NAMED = {"work", "filled", "mode", "rows", "bodies", "given", "pairs", "y"}  # arrays whose indices have names
 
 
 def functions(path: Path) -> list[ast.FunctionDef]:
@@ -91,5 +91,5 @@ def test_functions_are_small(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.stem}.{path.stem}")
-def test_no_number_stands_for_a_place(path: Path) -> None:
+def test_no_number_stands_for_an_index(path: Path) -> None:
     assert literal_indices(path) == []

@@ -90,7 +90,7 @@ def test_smallest_jump_is_confirmed_by_the_reference() -> None:
 def test_a_small_search_finds_a_jump_near_the_smallest_p() -> None:
     family = certificate.families()[1]
     found = certificate.search(family, draws=400, steps=300, seed=2)
-    start, mass, hertzian = family.start(found.place)
+    start, mass, hertzian = family.start(found.point)
     again = jumps(system_of(certificate.table_one(found.p, mass, hertzian), start), certificate.HORIZON)
     assert max(jump.height for jump in again) == found.jump.height >= family.part * 15.0 * (start @ start)
     assert 2.0 < found.p < 3.5

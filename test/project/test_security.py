@@ -164,18 +164,18 @@ def test_wishes_of_the_user_come_first() -> None:
     for given in ({}, {host.RANGE: host.LOCALHOST}, {host.RANGE: ""}, {host.MIDDLEWARE: host.OURS}):
         assert host.environment(given) == here
         assert host.network(given) == {host.RANGE: host.SUBNET}
-        assert host.place(given, "/").endswith("on this host")
+        assert host.location(given, "/").endswith("on this host")
     for reach in (host.SUBNET, "SYSTEM_DEFAULT"):
         assert host.environment({host.RANGE: reach}) == there
         assert host.network({host.RANGE: reach}) == {}
-        assert host.place({host.RANGE: reach}, "/").endswith("on the network")
+        assert host.location({host.RANGE: reach}, "/").endswith("on the network")
         assert host.environment({**here, host.RANGE: reach})[host.PROFILES] == str(host.NETWORK_PROFILE)
     for name in host.OTHERS:
         assert host.environment({name: "x"}) == {host.RANGE: host.LOCALHOST, **there}
     for name in (*host.PROFILE_FILES, host.MIDDLEWARE):
         assert host.environment({name: "x"}) == {host.RANGE: host.LOCALHOST}
         assert host.environment({name: "x", host.RANGE: host.SUBNET}) == {}
-    assert host.place({host.RANGE: host.LOCALHOST, host.SERVER: "there:11811"}, "/").endswith(
+    assert host.location({host.RANGE: host.LOCALHOST, host.SERVER: "there:11811"}, "/").endswith(
         "on this host, through ROS_DISCOVERY_SERVER there:11811")
 
 

@@ -50,8 +50,8 @@ TABLE_1 = {
 @pytest.mark.parametrize("name", CASES)
 def test_numbers_of_the_paper(name: str) -> None:
     expected = {section: dict(table) for section, table in TABLE_1.items()}
-    for place, value in CHANGES[name].items():
-        section, key = place.split(".")
+    for key_path, value in CHANGES[name].items():
+        section, key = key_path.split(".")
         for own in (section,) if section in expected else (f"left_{section}", f"right_{section}"):
             expected[own][key] = value
     scene = load(name)

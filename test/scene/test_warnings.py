@@ -106,10 +106,11 @@ def test_what_can_be_meant_does_not_warn(name: str, settings: tuple[str, ...]) -
 
 def started(scene: Scene, state: np.ndarray) -> Scene:
     """A scene from another state."""
-    places = {f"{body}.position_m": x for body, x in zip(("left_arm", "object", "right_arm"), state[0::2], strict=True)}
+    positions = {f"{body}.position_m": x
+                 for body, x in zip(("left_arm", "object", "right_arm"), state[0::2], strict=True)}
     rates = {f"{body}.velocity_m_per_s": v
              for body, v in zip(("left_arm", "object", "right_arm"), state[1::2], strict=True)}
-    return scene.changed({key: float(number) for key, number in {**places, **rates}.items()})
+    return scene.changed({key: float(number) for key, number in {**positions, **rates}.items()})
 
 
 def test_a_grasp_under_load_may_be_started_where_it_rests() -> None:

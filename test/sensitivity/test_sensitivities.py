@@ -126,8 +126,8 @@ def test_an_object_that_a_pulse_moves_from_rest(period: float) -> None:
     assert run.sensitivity is not None
     moving = np.array([0.0, 0.0, 0.25, 0.5])
     expected = np.stack([0.5 * moving**2, moving], axis=1)
-    for place, sign in ((0, -1.0), (1, 1.0)):
-        found = run.sensitivity.state_rates[:, 2:4, place]
+    for j, sign in ((0, -1.0), (1, 1.0)):
+        found = run.sensitivity.state_rates[:, 2:4, j]
         np.testing.assert_allclose(found, sign * expected, rtol=1e-12, atol=1e-15)
 
 
@@ -228,9 +228,9 @@ def test_directions_do_not_touch_each_other() -> None:
     scene = horizon("case_01", 3.0)
     keys = ["left_arm.mass_kg", P, "object.position_m", "right_arm.stiffness_N_per_m", "object.mass_kg"]
     several = derivatives(scene, *keys)
-    for place, key in enumerate(keys):
+    for j, key in enumerate(keys):
         alone = derivatives(scene, key)
-        np.testing.assert_allclose(several.state_rates[..., place], alone.state_rates[..., 0], rtol=1e-13, atol=0.0)
+        np.testing.assert_allclose(several.state_rates[..., j], alone.state_rates[..., 0], rtol=1e-13, atol=0.0)
 
 
 @pytest.mark.parametrize(("name", "key", "width"), [

@@ -12,7 +12,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene, SceneError
 from grasp_ros.simulation import simulate
-from grasp_ros.simulation.chunk import PLACES, REFUSED, STATUSES, Setup, Variants
+from grasp_ros.simulation.chunk import REFUSED, STATUSES, TARGETS, Setup, Variants
 from grasp_ros.simulation.ensemble import Table, ensemble
 from grasp_ros.simulation.outcomes import GROUPS
 from grasp_ros.simulation.quantities import settling_times
@@ -107,7 +107,7 @@ def test_arrays_are_built_and_refused_like_scenes() -> None:
             "sensor.velocity_noise_m_per_s=0.1", "sensor.velocity_step_m_per_s=0.1")),
     ])
     rng = np.random.default_rng(3)
-    named = {name: rng.normal(1.0, 2.0, 200) for name in PLACES}
+    named = {name: rng.normal(1.0, 2.0, 200) for name in TARGETS}
     named = {name: np.where(rng.random(200) < 0.8, np.rint(values), values) if name.endswith("_ticks") else values
              for name, values in named.items()}
     for name, values in named.items():

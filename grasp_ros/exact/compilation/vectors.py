@@ -88,20 +88,20 @@ def _of_llvm(name: str) -> Callable[..., Any]:
     return instruction
 
 
-def _places(context: Any, builder: Any, kinds: Any, values: Any, vector: Any) -> list[Any]:
+def _addresses(context: Any, builder: Any, kinds: Any, values: Any, vector: Any) -> list[Any]:
     """Where in an array the registers of a vector begin."""
     data = builder.gep(context.make_array(kinds.args[0])(context, builder, values[0]).data, [values[1]])
     return [builder.bitcast(builder.gep(data, [INDEX(i)]), QUAD.as_pointer()) for i in range(0, vector.width, HALF)]
 
 
 def _code_of_load(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
-    places = _places(context, builder, kinds, values, kinds.return_type)
-    return _vector(builder, [builder.load(place, align=ALIGNMENT) for place in places])
+    addresses = _addresses(context, builder, kinds, values, kinds.return_type)
+    return _vector(builder, [builder.load(address, align=ALIGNMENT) for address in addresses])
 
 
 def _code_of_store(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
-    for i, place in enumerate(_places(context, builder, kinds, values, kinds.args[2])):
-        builder.store(builder.extract_value(values[2], i), place, align=ALIGNMENT)
+    for i, address in enumerate(_addresses(context, builder, kinds, values, kinds.args[2])):
+        builder.store(builder.extract_value(values[2], i), address, align=ALIGNMENT)
     return context.get_dummy_value()
 
 

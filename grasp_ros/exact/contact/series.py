@@ -205,7 +205,7 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
 def expand_force(c: Array, pairs: Array, side: int, n: int, room: Array) -> None:
     """Write the series of an impact force, H w^3 (1 + p u') in N, of a finished table to the begin of `room`.
 
-    That has places for four series; those behind the force are scratch.
+    That has room for four series; those behind the force are scratch.
     """
     hertzian, loss = pairs[side, Law.HERTZIAN], pairs[side, Law.DISSIPATION]
     force, w, square, e = room[: n + 1], room[n + 1 : 2 * n + 2], room[2 * n + 2 : 3 * n + 3], room[3 * n + 3 :]

@@ -37,7 +37,7 @@ from grasp_ros.exact.records import (
     state_of,
     tables_of,
 )
-from grasp_ros.physics.layout import LEFT, RIGHT, Filled, Kind, Outcome, Pair, Place
+from grasp_ros.physics.layout import LEFT, RIGHT, Cursor, Filled, Kind, Outcome, Pair
 
 plant_in, state_in, tables_in = inlined(plant_of), inlined(state_of), inlined(tables_of)
 
@@ -132,7 +132,7 @@ def advance(
         if enters:
             if not open_interval(plant, state, loop):
                 return Outcome.NO_COMMAND.value
-            end, out = loop.lengths[loop.place[Place.INTERVAL]], enter_interval(plant, state, loop, out, grid)
+            end, out = loop.lengths[loop.cursor[Cursor.INTERVAL]], enter_interval(plant, state, loop, out, grid)
             idle, before, enters = 0, energy_level(plant, state, 0.0), False
             keep_scale(state, before)
         reached = write_reached(state, out)

@@ -18,7 +18,7 @@ from grasp_ros.exact.compilation.jit import COMPILED, address_of_code, code_of_c
 from grasp_ros.exact.compilation.reference import Reference
 from grasp_ros.exact.records import Integers, Segment, Tables
 
-ADDRESS, CONTEXT = 0, 1  # places of an observer
+ADDRESS, CONTEXT = 0, 1  # columns of an observer
 FINISH, REST = -1, -3  # in place of a kind of segment: after a run, and where nothing moves in an interval
 SIGNATURE = int64(int64, int64, float64, float64, float64, int64)  # of an observer, see `notify`
 _PLAIN: dict[int, Any] = {}  # where nothing is compiled: functions and records by their addresses

@@ -95,8 +95,8 @@ def penetrates(plant: Plant, state: State, side: Body, before: float, size: floa
     if state.mode[side] != Pair.OPEN or u <= max(before, 0.0):
         return False
     fastest = math.sqrt(size / plant.given[side, Of.MASS]) + math.sqrt(size / plant.given[OBJECT, Of.MASS])
-    place = abs(arm_of(state.y, side)[0]) + abs(state.y[X.O])
-    return u > ENERGY * EPS * place + part * t * fastest + DIED_OUT
+    distance = abs(arm_of(state.y, side)[0]) + abs(state.y[X.O])
+    return u > ENERGY * EPS * distance + part * t * fastest + DIED_OUT
 
 
 @inlined

@@ -17,7 +17,7 @@ from grasp_ros.exact.driver.user_controller import call
 from grasp_ros.exact.kinematics import arm_of
 from grasp_ros.exact.records import Array, Loop, Output, Plant, State
 from grasp_ros.physics import control
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Answer, Of, Outcome, Place, V
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Answer, Cursor, Of, Outcome, V
 
 FIRST = whole(0)  # interval
 is_due, measured = kernel(control.is_due), kernel(control.measured)
@@ -34,7 +34,7 @@ def answer(state: State, loop: Loop, k: int) -> bool:
         callee, row = loop.callee[side], loop.laws[side]
         if callee == Answer.GIVEN:
             continue
-        if not is_due(row, loop.place[Place.TICK] + k):
+        if not is_due(row, loop.cursor[Cursor.TICK] + k):
             loop.answers[k, side] = loop.held[side]
             continue
         x, v, _ = arm_of(state.y, side)
@@ -42,9 +42,9 @@ def answer(state: State, loop: Loop, k: int) -> bool:
         if callee == Answer.LAW:
             force = feedback(row, x, v)
         else:
-            force = call(callee, loop.place[Place.TICK] + k, state.clock[2], x, v)
+            force = call(callee, loop.cursor[Cursor.TICK] + k, state.clock[2], x, v)
             if not math.isfinite(force):
-                loop.place[Place.FAILED] = side
+                loop.cursor[Cursor.FAILED] = side
                 return False
         loop.held[side] = loop.answers[k, side] = limited(row, force)
     return True
@@ -54,7 +54,7 @@ def answer(state: State, loop: Loop, k: int) -> bool:
 def set_inputs(plant: Plant, loop: Loop, k: int) -> None:
     """Let the commands that arrive at the begin of interval k act, and the external forces."""
     held, pushed, delay = loop.answers.shape[0] > 0, loop.external.shape[0] > 0, loop.waiting.shape[0]
-    slot = (loop.place[Place.TICK] + k) % delay if delay > 0 else 0
+    slot = (loop.cursor[Cursor.TICK] + k) % delay if delay > 0 else 0
     for body in (LEFT, RIGHT, OBJECT):
         force = loop.answers[k, body] if held else 0.0
         if delay > 0:
@@ -68,22 +68,22 @@ def set_inputs(plant: Plant, loop: Loop, k: int) -> None:
 @inlined
 def open_interval(plant: Plant, state: State, loop: Loop) -> bool:
     """Begin the next interval, unless it has begun; False if a controller gives no number."""
-    if loop.place[Place.BEGUN]:
+    if loop.cursor[Cursor.BEGUN]:
         return True
-    k = loop.place[Place.INTERVAL]
+    k = loop.cursor[Cursor.INTERVAL]
     state.clock[0], state.clock[1], state.clock[2] = 0.0, 0.0, loop.begins[k]
     if loop.inputs.shape[0] > 0:
         if loop.answers.shape[0] > 0 and not answer(state, loop, k):
             return False
         set_inputs(plant, loop, k)
-    loop.place[Place.BEGUN] = 1
+    loop.cursor[Cursor.BEGUN] = 1
     return True
 
 
 @inlined
 def enter_interval(plant: Plant, state: State, loop: Loop, out: Output, grid: Array) -> Output:
     """Set the modes of an interval that begins or resumes; returns `out` with the output times up to its end."""
-    end = loop.bounds[loop.place[Place.INTERVAL] + 1]
+    end = loop.bounds[loop.cursor[Cursor.INTERVAL] + 1]
     out = Output(grid[:end], out.rows, out.events, out.filled, out.work, out.observer)
     begin_interval(plant, state, out)
     return out
@@ -97,15 +97,15 @@ def rest(state: State, loop: Loop) -> None:
     put(state, V.R, 0.0)
     if state.rest[SINCE] == math.inf:
         state.rest[SINCE] = (state.clock[0] + state.clock[1]) + state.clock[2]
-    state.clock[0], state.clock[1] = loop.lengths[loop.place[Place.INTERVAL]], 0.0
+    state.clock[0], state.clock[1] = loop.lengths[loop.cursor[Cursor.INTERVAL]], 0.0
 
 
 @inlined
 def close_interval(loop: Loop) -> bool:
     """End an interval; whether another one follows."""
-    loop.place[Place.INTERVAL] += 1
-    loop.place[Place.BEGUN] = 0
-    following: bool = loop.place[Place.INTERVAL] < loop.lengths.shape[0]
+    loop.cursor[Cursor.INTERVAL] += 1
+    loop.cursor[Cursor.BEGUN] = 0
+    following: bool = loop.cursor[Cursor.INTERVAL] < loop.lengths.shape[0]
     return following
 
 

@@ -15,7 +15,7 @@ from grasp_ros.exact.records import Level, Plant, State
 from grasp_ros.exact.tolerances import DERIVATIVE, REST
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, Slide, U, V, X
 
-ENERGY, LENGTH, SINCE = range(3)  # places of `State.rest`: J of V and m, so far, and the time of rest in s
+ENERGY, LENGTH, SINCE = range(3)  # columns of `State.rest`: J of V and m, so far, and the time of rest in s
 
 
 @inlined

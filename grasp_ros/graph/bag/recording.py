@@ -247,8 +247,8 @@ class Recording(Motion, Frozen):
 
         Of the plant alone, without its controllers, unless `closed`.
         """
-        ticks, place = np.unique(self.scene_tick, return_inverse=True)
-        external = self.scene.system.external_over(ticks)[place]
+        ticks, index = np.unique(self.scene_tick, return_inverse=True)
+        external = self.scene.system.external_over(ticks)[index]
         if not self.closed:
             return energy(self.scene.system, self.state, external, feedback=False)
         parts = [energy(scene.system, self.state[rows], external[rows]) for scene, rows in self.parts]

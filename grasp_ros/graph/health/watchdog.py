@@ -16,7 +16,7 @@ from rclpy.node import Node
 
 from grasp_ros.graph.health.heartbeat import HEARTBEAT_SECONDS
 from grasp_ros.graph.stopping import tell_parent
-from grasp_ros.physics.errors import place_of
+from grasp_ros.physics.errors import line_of
 
 EVERY_SECONDS = 5.0  # from one sentence to the next
 PAUSE_SECONDS = 2.0 * HEARTBEAT_SECONDS  # between two beats, if the process was stopped itself
@@ -64,7 +64,7 @@ class Watchdog:
         if not frozen and seconds <= most:
             return
         frame = sys._current_frames()[threading.main_thread().ident or 0]  # in which the nodes are
-        why = f"{frozen} suspended" if frozen else f"in {place_of(extract_stack(frame))}"
+        why = f"{frozen} suspended" if frozen else f"in {line_of(extract_stack(frame))}"
         name = self._name if frozen else _node_of(frame) or self._name
         if self._beaten - self._said > EVERY_SECONDS:
             self._said = self._beaten

@@ -195,7 +195,7 @@ class Plant(PeerNode):
         tick, state = self._plant.tick, self._plant.state
         time_ns = tick * self.scene.period_ns
         present, numbers, effort = self.scene.system.present, state.tolist(), self._plant.effort.tolist()
-        x, v = ([numbers[COLUMN[body] + place] for body in present] for place in (0, 1))
+        x, v = ([numbers[COLUMN[body] + part] for body in present] for part in (0, 1))
         self._simulated.publish(self._clock_template.fill(time_ns, ()))
         self._states.publish(self._state_template.fill(time_ns, [*x, *v, *(effort[body] for body in present)]))
         for publisher, template, value in self._forces:  # while the controllers answer the state

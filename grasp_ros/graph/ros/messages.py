@@ -39,7 +39,7 @@ TYPES = {
 READER_DEPTH = 10  # of texts, which may be large
 FOREVER = Infinite.nanoseconds
 AUTOMATIC = LivelinessPolicy.SYSTEM_DEFAULT, LivelinessPolicy.AUTOMATIC
-ABSENT = [0.0, math.nan]  # force on a body that a state does not name, and its place and velocity
+ABSENT = [0.0, math.nan]  # force on a body that a state does not name, and its position and velocity
 UNREADABLE = (RuntimeError, ValueError, struct.error)  # raised for bytes that are no message of a type
 
 
@@ -106,7 +106,7 @@ class StateReader:
     def __init__(self, names: Collection[str]) -> None:
         self._needed = names  # of bodies that every state has
         self._template: Template | None = None
-        self._places: list[int] = []  # of the six numbers and three inputs in a message
+        self._indices: list[int] = []  # of the six numbers and three inputs in a message
 
     def read(self, cdr: bytes) -> State:
         """A state.
@@ -122,7 +122,7 @@ class StateReader:
         if not math.isfinite(sum(numbers)) and not all(map(math.isfinite, numbers)):
             raise Refused("a number of a state is not finite")
         numbers += ABSENT
-        picked = [numbers[place] for place in self._places]
+        picked = [numbers[i] for i in self._indices]
         return State(seconds * NANOSECONDS + nanoseconds, picked[:6], picked[6:])
 
     def _decoded(self, cdr: bytes) -> Iterable[Any]:
@@ -136,5 +136,5 @@ class StateReader:
         self._template, n = template_of(JOINT_STATES, name), len(name)
         at = {body: name.index(word) if word in name else None for body, word in NAMES.items()}
         kinds = [(body, kind) for body in BODIES for kind in (0, 1)] + [(body, 2) for body in sorted(BODIES)]
-        self._places = [-1 - (kind == 2) if (i := at[body]) is None else kind * n + i for body, kind in kinds]
+        self._indices = [-1 - (kind == 2) if (i := at[body]) is None else kind * n + i for body, kind in kinds]
         return chain((message.header.stamp.sec, message.header.stamp.nanosec), *lists)

@@ -18,7 +18,7 @@ from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from grasp_ros.graph.host import place
+from grasp_ros.graph.host import location
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.parameter_node import ParameterNode
 from grasp_ros.graph.stopping import tell_parent
@@ -68,7 +68,7 @@ class GraspNode(ParameterNode):
         self.concern = ""  # what is not as it should be, although the node goes on
         self.trouble = ""  # what keeps it from going on
         self.phase = Phase.WAITING
-        self.where = place(os.environ, self.get_namespace())  # where it looks for others, in words
+        self.where = location(os.environ, self.get_namespace())  # where it looks for others, in words
         self.words = f"waiting for peers {self.where}"  # what it does or waits for: the message of its /diagnostics
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._diagnostics = self.publisher(DIAGNOSTICS)

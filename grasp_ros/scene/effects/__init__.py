@@ -37,8 +37,8 @@ def build(values: Mapping[str, Mapping[str, Any]]) -> System:
     """What the numbers of a scene describe, as arrays; they need not be in their ranges."""
     system = System()
     for effect in named(values):
-        for key, place in effect.places.items():
-            system.put(place, values[effect.section].get(key, 0.0))
+        for key, target in effect.targets.items():
+            system.put(target, values[effect.section].get(key, 0.0))
         effect.build(values, system)
     for array in (system.bodies, system.pairs, system.state):
         array.setflags(write=False)

@@ -13,7 +13,7 @@ from grasp_ros.physics.domain import SMALLEST
 from grasp_ros.physics.given import plain
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import COLUMN, Place, System
+from grasp_ros.physics.system import COLUMN, System, Target
 from grasp_ros.scene.topics import Topic
 
 Numbers = Mapping[str, Any]  # one section of a scene: its keys and values
@@ -53,7 +53,7 @@ class Parameter(NamedTuple):
     whole: bool = False
     several: bool = False
     smallest: float = SMALLEST  # of what is not 0
-    place: tuple[str, int] | None = None  # array of a system and column, where it goes straight into one
+    target: tuple[str, int] | None = None  # array of a system and column, where it goes straight into one
 
     @property
     def unit(self) -> str:
@@ -138,7 +138,7 @@ class Effect:
     build: Callable[[Sections, System], None]  # adds to the system what is more than numbers in their places
     certificate: str  # what it does to V_c, in words
     needs: tuple[str, ...] = ()  # sections that must be there as well
-    row: int = 0  # of the numbers that have a place in arrays: a side or a body
+    row: int = 0  # of the numbers that have a target: a side or a body
     node: str = "plant"  # the executable that declares its parameters
     commands: Topic | None = None  # topic of the controller that it brings
     outputs: tuple[Output, ...] = ()  # what the plant publishes about it
@@ -148,9 +148,9 @@ class Effect:
     example: Numbers = field(default_factory=dict)  # keys to add to a scene to see what it does; none: the paper has it
 
     @cached_property
-    def places(self) -> dict[str, Place]:
-        """Where numbers go that enter in one place of the arrays alone, by key."""
-        return {own.key: _place(self.row, *own.place) for own in self.parameters if own.place is not None}
+    def targets(self) -> dict[str, Target]:
+        """Where numbers go that enter in one number of the arrays alone, by key."""
+        return {own.key: _target(self.row, *own.target) for own in self.parameters if own.target is not None}
 
     def warnings(self, sections: Sections, system: System) -> Iterable[str]:
         """Suspicious settings."""
@@ -159,7 +159,7 @@ class Effect:
         return self.oddities(sections, system)
 
 
-def _place(row: int, array: str, column: int) -> Place:
+def _target(row: int, array: str, column: int) -> Target:
     if array == "state":
         return array, COLUMN[row] + column, 0
     return array, 0 if array == "coulomb" else int(row), int(column)

@@ -9,16 +9,16 @@ from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.scene.effects.base import SIDES, Effect, Parameter, Relation, Sections, nothing, problem
 
-MASS_KG = Parameter("mass_kg", *RANGES["mass"].bounds, "mass", place=("bodies", Of.MASS))
+MASS_KG = Parameter("mass_kg", *RANGES["mass"].bounds, "mass", target=("bodies", Of.MASS))
 MOTION = (
     Parameter("position_m", *RANGES["position, set-point"].bounds, "initial position", smallest=0.0,
-              place=("state", 0)),
-    Parameter("velocity_m_per_s", *RANGES["velocity"].bounds, "initial velocity", smallest=0.0, place=("state", 1)),
+              target=("state", 0)),
+    Parameter("velocity_m_per_s", *RANGES["velocity"].bounds, "initial velocity", smallest=0.0, target=("state", 1)),
 )
 SPRING = Parameter("stiffness_N_per_m", *RANGES["stiffness of an arm"].bounds, "spring of the arm, k", optional=True,
-                   place=("bodies", Of.STIFFNESS))
+                   target=("bodies", Of.STIFFNESS))
 DAMPER = Parameter("damping_Ns_per_m", *RANGES["damping, drag"].bounds, "damper of the arm, c", optional=True,
-                   place=("bodies", Of.DAMPING))
+                   target=("bodies", Of.DAMPING))
 SUMS = {"stiffness_N_per_m": "position_gain_N_per_m", "damping_Ns_per_m": "velocity_gain_Ns_per_m"}
 
 

@@ -16,9 +16,9 @@ from grasp_ros.scene.topics import CONTACTS
 ROUNDING = 1e-9  # of the largest position, or of 1 m: what is less deep is meant to touch
 PARAMETERS = (
     Parameter("hertz_N_per_m1_5", *RANGES["Hertzian stiffness H"].bounds, "Hertzian stiffness of the impact, H",
-              place=("pairs", Law.HERTZIAN)),
+              target=("pairs", Law.HERTZIAN)),
     Parameter("dissipation_s_per_m", *RANGES["dissipation p"].bounds, "Hunt-Crossley dissipation of the impact, p",
-              optional=True, place=("pairs", Law.DISSIPATION)),
+              optional=True, target=("pairs", Law.DISSIPATION)),
 )
 
 
@@ -39,17 +39,17 @@ def _odd(side: str, sections: Sections, system: System) -> Iterable[str]:
     depths = penetration(system.state)[0::2]
     depth, gap = float(depths[at]), float(-depths[SIDES[far]])
     key, value = f"{side}_arm.position_m", sections[f"{side}_arm"]["position_m"]
-    place = sections["object"]["position_m"]
+    position = sections["object"]["position_m"]
     if depth <= ROUNDING * min(1.0, max(map(abs, system.state[0::2].tolist()))):
         return
     stored, pressing = stored_energy(system.pairs[at, Law.HERTZIAN], depth), _pressing(system, at, depth)
     if SIDES[far] in system.contacts and 0.0 < gap < depth:
         why = f"lies {far} of the {far} arm, which does not touch the object"
-        yield oddity(key, value, why, f"each arm on its side of the object at {place!r}")
+        yield oddity(key, value, why, f"each arm on its side of the object at {position!r}")
     elif stored > pressing:
         why = (f"lies {depth:.6g} m inside the object: the contact stores {stored:.3g} J, where motion and forces"
                f" press in {pressing:.3g} J")
-        yield oddity(key, value, why, f"{side} of the object at {place!r}, or a little {far} of it")
+        yield oddity(key, value, why, f"{side} of the object at {position!r}, or a little {far} of it")
 
 
 def _pressing(system: System, side: int, depth: float) -> float:

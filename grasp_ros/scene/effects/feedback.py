@@ -13,14 +13,14 @@ from grasp_ros.scene.topics import COMMANDS
 
 PARAMETERS = (
     Parameter("position_gain_N_per_m", *RANGES["position gain"].bounds, "gain of the position feedback, Kp", live=True,
-              place=("laws", Column.POSITION_GAIN)),
+              target=("laws", Column.POSITION_GAIN)),
     Parameter("velocity_gain_Ns_per_m", *RANGES["velocity gain"].bounds, "gain of the velocity feedback, Kv",
-              live=True, place=("laws", Column.VELOCITY_GAIN)),
+              live=True, target=("laws", Column.VELOCITY_GAIN)),
     Parameter("set_point_m", *RANGES["position, set-point"].bounds,
               "position that the feedback aims at; without it 0, as in the paper", optional=True, live=True,
-              smallest=0.0, place=("laws", Column.SET_POINT)),
+              smallest=0.0, target=("laws", Column.SET_POINT)),
     Parameter("feed_forward_N", *RANGES["force"].bounds, "constant force added to the feedback", optional=True,
-              live=True, place=("laws", Column.FEED_FORWARD)),
+              live=True, target=("laws", Column.FEED_FORWARD)),
 )
 
 

@@ -12,7 +12,7 @@ from grasp_ros.scene.effects.time import ticks_of
 
 PARAMETERS = (
     Parameter("period_ticks", 1, 1_000_000, "control periods from an answer of the controller to its next one",
-              whole=True, place=("laws", Column.PERIOD)),
+              whole=True, target=("laws", Column.PERIOD)),
 )
 
 

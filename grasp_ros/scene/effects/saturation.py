@@ -12,7 +12,7 @@ from grasp_ros.scene.effects.base import SIDES, Effect, Parameter, Sections, odd
 
 PARAMETERS = (
     Parameter("limit_N", 0.0, RANGES["force"].high, "largest force of the actuator in both directions", live=True,
-              place=("laws", Column.LIMIT)),
+              target=("laws", Column.LIMIT)),
 )
 
 

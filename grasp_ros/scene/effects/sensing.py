@@ -12,13 +12,13 @@ from grasp_ros.scene.effects.base import SIDES, Effect, Parameter, Sections, odd
 SEED = Parameter("noise_seed", 0, 2**31 - 1, "seed of the noise", whole=True)
 MEASURED = (
     Parameter("position_noise_m", 0.0, 1e3, "standard deviation of the measured position", optional=True,
-              place=("laws", Column.POSITION_NOISE)),
+              target=("laws", Column.POSITION_NOISE)),
     Parameter("velocity_noise_m_per_s", 0.0, 1e3, "standard deviation of the measured velocity", optional=True,
-              place=("laws", Column.VELOCITY_NOISE)),
+              target=("laws", Column.VELOCITY_NOISE)),
     Parameter("position_step_m", 1e-12, 1e3, "resolution of the measured position", optional=True,
-              place=("laws", Column.POSITION_STEP)),
+              target=("laws", Column.POSITION_STEP)),
     Parameter("velocity_step_m_per_s", 1e-12, 1e3, "resolution of the measured velocity", optional=True,
-              place=("laws", Column.VELOCITY_STEP)),
+              target=("laws", Column.VELOCITY_STEP)),
 )
 GAINS = {"position": "position_gain_N_per_m", "velocity": "velocity_gain_Ns_per_m"}  # of what is measured
 

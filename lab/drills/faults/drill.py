@@ -150,8 +150,8 @@ def _read_words(evidence: Evidence, stage: Stage, begin: float, end: float) -> N
     words = [line.text for line in news]
     spoken = [text for text in words if SENTENCE.match(text)] or words or [text for _, text in reports] or [""]
     causes = [text for text in spoken if SUSPENDED not in text or evidence.culprit == SUSPENDED] or spoken
-    evidence.said = plain(causes[0] if evidence.went_on else spoken[-1], [stage.place])
-    evidence.traceback = plain(stage.output.traceback, [stage.place])
+    evidence.said = plain(causes[0] if evidence.went_on else spoken[-1], [stage.folder])
+    evidence.traceback = plain(stage.output.traceback, [stage.folder])
 
 
 def _read_bag(evidence: Evidence, stage: Stage, accident: float) -> None:
@@ -164,7 +164,7 @@ def _read_bag(evidence: Evidence, stage: Stage, accident: float) -> None:
         if "holds no tick" in str(error):  # killed before the first was on the disk
             evidence.lost = _seconds_from(stage, 0, accident)
         else:
-            evidence.wrong, evidence.lost = plain(str(error), [stage.place]), math.inf
+            evidence.wrong, evidence.lost = plain(str(error), [stage.folder]), math.inf
         return
     gone = {name: number for name, number in recording.missing.items() if number}
     found = verify(recording)

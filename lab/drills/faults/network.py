@@ -81,7 +81,7 @@ def peer(stage: Stage) -> Evidence:
     """A plant with ROS's own LOCALHOST is found by that peer; one of this package's is not."""
     inside = build(stage)
     stage.look_on_from(on(inside["two"], ROS_STATIC_PEERS=f"{LINK}.1"))
-    found, empty = {}, stage.place / "theirs.xml"
+    found, empty = {}, stage.folder / "theirs.xml"
     empty.write_text("<dds/>")
     for name, more in (("theirs", {WISH: str(empty)}), ("ours", {})):
         stage.node("plant", prefix=on(inside["one"], **{RANGE: LOCALHOST, **more}))

@@ -94,11 +94,11 @@ class Output:
         return [line for line in self.lines if begin <= line.when <= end and not NO_NEWS.match(line.text)]
 
 
-def plain(text: str, places: Iterable[Path]) -> str:
+def plain(text: str, folders: Iterable[Path]) -> str:
     """A line without what differs between two runs: paths, process ids, times, and numbers of ticks."""
     text = LOGGED.sub(r"\2: ", text)
-    for place in places:
-        text = text.replace(str(place), "DIR")
+    for folder in folders:
+        text = text.replace(str(folder), "DIR")
     text = re.sub(r"(?<![\w.])pid \d+", "pid N", text)
     text = re.sub(r"\btick \d+", "tick N", text)
     text = re.sub(r"\bt = [\d.e+-]+ s", "t = T s", text)

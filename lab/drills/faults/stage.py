@@ -40,7 +40,7 @@ class Stage:
 
     Parameters
     ----------
-    place : Path
+    folder : Path
         New directory.
     scene : Scene
     companion : Companion
@@ -50,12 +50,12 @@ class Stage:
     """
 
     def __init__(
-        self, place: Path, scene: Scene, companion: Companion, domain: int, seen: Topic = JOINT_STATES
+        self, folder: Path, scene: Scene, companion: Companion, domain: int, seen: Topic = JOINT_STATES
     ) -> None:
-        self.place, self.scene, self.companion, self.domain, self.seen = place, scene, companion, domain, seen
+        self.folder, self.scene, self.companion, self.domain, self.seen = folder, scene, companion, domain, seen
         self.mark = uuid.uuid4().hex
-        place.mkdir()
-        self._scene_file = place / f"{scene.name}.yaml"
+        folder.mkdir()
+        self._scene_file = folder / f"{scene.name}.yaml"
         self._scene_file.write_text(scene.to_yaml(), encoding="utf-8")
         self.output = Output()
         self._reached = -1
@@ -63,12 +63,12 @@ class Stage:
         self.accident = math.nan  # when it happened, monotonic
         self.asleep = 0.0, 0.0  # from when to when nobody could do anything
         self.started: dict[str, subprocess.Popen[bytes]] = {}
-        self.times: Array = np.lib.format.open_memmap(place / "times.npy", "w+", float, (scene.ticks + 1,))
+        self.times: Array = np.lib.format.open_memmap(folder / "times.npy", "w+", float, (scene.ticks + 1,))
         self._others = companion
         self._open()
 
     def _open(self) -> None:
-        times = str(self.place / "times.npy")
+        times = str(self.folder / "times.npy")
         self.companion.ask(
             "open", domain=self.domain, times=times, period_ns=self.scene.period_ns, topic=self.seen.name
         )
@@ -82,13 +82,13 @@ class Stage:
     @property
     def bag(self) -> Path:
         """Where the bag is."""
-        return self.place / "run" / "bag"
+        return self.folder / "run" / "bag"
 
     @property
     def environment(self) -> dict[str, str]:
         """Variables of the processes."""
         return {
-            **os.environ, MARK: self.mark, "ROS_DOMAIN_ID": str(self.domain), "ROS_LOG_DIR": str(self.place / "log"),
+            **os.environ, MARK: self.mark, "ROS_DOMAIN_ID": str(self.domain), "ROS_LOG_DIR": str(self.folder / "log"),
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "PYTHONUNBUFFERED": "1",
         }
 
@@ -98,7 +98,7 @@ class Stage:
         if follow:
             options |= {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
         process = subprocess.Popen(
-            command, cwd=self.place,
+            command, cwd=self.folder,
             **{"env": self.environment, "start_new_session": True, "stdin": subprocess.DEVNULL, **options},
         )
         if follow:
@@ -107,9 +107,9 @@ class Stage:
         self.started[name] = process
         return process
 
-    def run_words(self, *words: str, place: str = "run") -> list[str]:
-        """`grasp run` of the scene, which writes to a place in the directory."""
-        return [*GRASP, "run", str(self._scene_file), "-o", str(self.place / place), *words]
+    def run_words(self, *words: str, folder: str = "run") -> list[str]:
+        """`grasp run` of the scene, which writes to a folder in the directory."""
+        return [*GRASP, "run", str(self._scene_file), "-o", str(self.folder / folder), *words]
 
     def run(self, *words: str) -> None:
         """Start `grasp run`."""
@@ -228,7 +228,7 @@ class Stage:
             self.companion.ask("close")
         else:
             self.companion.close()
-        shutil.rmtree(self.place, ignore_errors=True)
+        shutil.rmtree(self.folder, ignore_errors=True)
 
 
 def _shared(process: psutil.Process) -> set[str]:

@@ -130,7 +130,7 @@ def _second(stage: Stage, name: str, topic: Topic, words: Sequence[str] = ()) ->
 
 
 def _second_run(stage: Stage) -> None:
-    stage.start("second run", stage.run_words(place="second"))
+    stage.start("second run", stage.run_words(folder="second"))
     stage.wait(lambda: stage.ended("second run"), 20.0)
     stage.happens()
 

@@ -87,12 +87,12 @@ def _close_output(stage: Stage) -> None:
 def _on_small_disk(stage: Stage) -> None:
     if subprocess.run(["unshare", "-rm", "true"], capture_output=True, check=False).returncode:
         raise Skipped("no file system may be mounted here")
-    disk = stage.place / "disk"
+    disk = stage.folder / "disk"
     disk.mkdir()
     script = ('mount -t tmpfs -o size="$0" none "$1" && target="$1" && copy="$2" && shift 2 && trap : INT && "$@";'
               ' status=$?; cp -r "$target/run" "$copy"; exit $status')
-    given = [script, str(DISK_BYTES), str(disk), str(stage.place)]
-    stage.start("grasp run", ["unshare", "-rm", "sh", "-c", *given, *stage.run_words(place="disk/run")])
+    given = [script, str(DISK_BYTES), str(disk), str(stage.folder)]
+    stage.start("grasp run", ["unshare", "-rm", "sh", "-c", *given, *stage.run_words(folder="disk/run")])
 
 
 def _with_limit(stage: Stage) -> None:
@@ -166,7 +166,7 @@ def _all_remapped(stage: Stage) -> None:
 def _power_cut(stage: Stage) -> Evidence:
     """A recording in which every chunk is on the disk, cut off: what is read grows with the length, and is right."""
     run = simulate(scenes.load(stage.scene.name, ["time.duration_s=2"]), sampled=True)
-    path, cut = stage.place / "whole", stage.place / "cut"
+    path, cut = stage.folder / "whole", stage.folder / "cut"
     recorder.write(path, run)
     whole, kept, wrong = next(path.glob("*.mcap")).read_bytes(), -1, ""
     cut.mkdir()
@@ -185,7 +185,7 @@ def _power_cut(stage: Stage) -> Evidence:
 
 
 def _damaged(stage: Stage) -> Evidence:
-    words = [sys.executable, "-m", "lab", "readers", "--count", str(FILE_COUNT), "-o", str(stage.place / "readers")]
+    words = [sys.executable, "-m", "lab", "readers", "--count", str(FILE_COUNT), "-o", str(stage.folder / "readers")]
     found = subprocess.run(words, capture_output=True, text=True, check=False, cwd=CHECKOUT)
     good = found.returncode == 0
     return Evidence(said="refused in a sentence, or read as what they are", went_on=good, nothing_to_keep=True,

@@ -167,10 +167,10 @@ def filled(message: Any, fields: dict[str, Any]) -> Any:
                 message.header.stamp = messages.to_time(time.time_ns() if value == WALL else value)
             continue
         *parents, last = path.split(".")
-        place = message
+        part = message
         for parent in parents:
-            place = getattr(place, parent)
-        setattr(place, last, math.nan if value == "nan" else value)
+            part = getattr(part, parent)
+        setattr(part, last, math.nan if value == "nan" else value)
     return message
 
 

@@ -1,22 +1,22 @@
-"""Numbers of a scene: what each is, and which go straight into one place of the arrays of its system."""
+"""Numbers of a scene: what each is, and which go straight into one number of the arrays of its system."""
 
 from __future__ import annotations
 
 import os
 
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.system import Place
+from grasp_ros.physics.system import Target
 from grasp_ros.scene.effects import EFFECTS
 from grasp_ros.scene.effects.base import Parameter
 from grasp_ros.scene.scene import Scene
 
-PLACES: dict[str, Place] = {f"{effect.section}.{key}": place for effect in EFFECTS
-                            for key, place in effect.places.items()}
+TARGETS: dict[str, Target] = {f"{effect.section}.{key}": target for effect in EFFECTS
+                            for key, target in effect.targets.items()}
 
 
-def place_of(scene: Scene, key: str) -> Place | None:
-    """The only place where a number of a scene enters; None: a mass has a weight, too, and others have no place."""
-    return None if "tilt" in scene.values and key.endswith(".mass_kg") else PLACES.get(key)
+def target_of(scene: Scene, key: str) -> Target | None:
+    """The only target where a number of a scene enters; None: a mass has a weight, too, and others have none."""
+    return None if "tilt" in scene.values and key.endswith(".mass_kg") else TARGETS.get(key)
 
 
 def check_scene(scene: object) -> None:
