@@ -52,8 +52,8 @@ def finest(scene: Scene) -> Truth:
     truth, rounding = Truth(grid, run.state, _touches(run)), EPS * float(np.nanmax(np.abs(run.state[:, 0::2])))
     apart = [distance(truth, simulate(scene, grid=grid, setting=FINER * FINEST).state) / FINER]
     for body in {*BODIES} & {*scene.values}:
-        beside = scene.changed({f"{body}.position_m": scene.values[body]["position_m"] + rounding})  # farther right
-        apart.append(distance(truth, simulate(beside, grid=grid, setting=FINEST).state))
+        shifted = scene.changed({f"{body}.position_m": scene.values[body]["position_m"] + rounding})  # farther right
+        apart.append(distance(truth, simulate(shifted, grid=grid, setting=FINEST).state))
     return truth._replace(uncertainty=max(apart))
 
 

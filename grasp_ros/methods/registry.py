@@ -145,5 +145,5 @@ def _beside_the_paper(scene: Scene) -> list[str]:
         f"{section}.{key}" for section in ("left_feedback", "right_feedback")
         for key in ("set_point_m", "feed_forward_N") if scene.values.get(section, {}).get(key)
     ]
-    lacking, beside = sorted(PAPER - set(scene.values)), sorted([*set(scene.values) - PAPER, *forces])
-    return [f"{word} {', '.join(found)}" for word, found in (("lacks", lacking), ("has", beside)) if found]
+    lacking, more = sorted(PAPER - set(scene.values)), sorted([*set(scene.values) - PAPER, *forces])
+    return [f"{word} {', '.join(found)}" for word, found in (("lacks", lacking), ("has", more)) if found]

@@ -246,8 +246,8 @@ def _first_members(function: Callable[[Array], Array], axes: int, seed: int) -> 
     there = sample[reached < NOTHING]
     if 0 < len(there) < half:
         apart = rng.uniform(-1.0, 1.0, sample.shape) * len(sample) ** (-1.0 / axes)  # to the next choices of the sample
-        beside = np.clip(there[rng.integers(len(there), size=len(sample))] + apart, 0.0, 1.0)
-        sample, reached = np.vstack([sample, beside]), np.concatenate([reached, function(beside.T)])
+        neighbours = np.clip(there[rng.integers(len(there), size=len(sample))] + apart, 0.0, 1.0)
+        sample, reached = np.vstack([sample, neighbours]), np.concatenate([reached, function(neighbours.T)])
     return np.vstack([sample[np.argsort(reached, kind="stable")[:half]], spread])
 
 

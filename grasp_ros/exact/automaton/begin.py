@@ -25,10 +25,10 @@ MOST_HALVINGS = 200  # of a short flight
 @inlined
 def must_begin(state: State, side: Body) -> bool:
     """Whether a pair in contact is where no Taylor step can start."""
-    y, beside = state.y, other(side)
+    y, opposite = state.y, other(side)
     if state.mode[side] != Pair.CONTACT or y[U.L + side] != 0.0:
         return False
-    joint = state.mode[beside] in (Pair.CONTACT, Pair.BEGINNING) and y[U.L + beside] == 0.0
+    joint = state.mode[opposite] in (Pair.CONTACT, Pair.BEGINNING) and y[U.L + opposite] == 0.0
     return bool(joint or approach(y, side) == 0.0)
 
 

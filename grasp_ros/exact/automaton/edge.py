@@ -28,15 +28,15 @@ GROWTH = math.gamma(2.0 * EXPONENT + 1.0)  # derivative of that order of t^(2 EX
 @kernel
 def other_push(plant: Plant, state: State, side: Body) -> tuple[float, float]:
     """Acceleration in m/s^2, and its rate, that the force of the other pair gives the object towards `side`."""
-    beside = other(side)
-    u = state.y[U.L + beside]
-    if state.mode[beside] != Pair.CONTACT or u <= 0.0:
+    opposite = other(side)
+    u = state.y[U.L + opposite]
+    if state.mode[opposite] != Pair.CONTACT or u <= 0.0:
         return 0.0, 0.0
-    hertzian, loss = plant.pairs[beside, Law.HERTZIAN], plant.pairs[beside, Law.DISSIPATION]
+    hertzian, loss = plant.pairs[opposite, Law.HERTZIAN], plant.pairs[opposite, Law.DISSIPATION]
     mass = plant.bodies[OBJECT, Of.MASS]
-    d, a = relative_motion(plant, state.y, beside)
-    elastic, factor = elastic_force(hertzian, u), surface_factor(plant.pairs, state.y, beside, SURFACE)
-    a -= elastic * factor / reduced_mass(plant.bodies, beside)
+    d, a = relative_motion(plant, state.y, opposite)
+    elastic, factor = elastic_force(hertzian, u), surface_factor(plant.pairs, state.y, opposite, SURFACE)
+    a -= elastic * factor / reduced_mass(plant.bodies, opposite)
     pace = elastic_slope(hertzian, u) * d * factor + elastic * loss * a
     return elastic * factor / mass, pace / mass
 
@@ -51,32 +51,32 @@ def deciding_derivative(plant: Plant, state: State, side: Body) -> Deciding:
     own = own_difference(plant, state.y, side)
     if plant.bodies[OBJECT, Of.MASS] == math.inf:
         return own
-    beside = other(side)
-    presses = state.mode[beside] == Pair.CONTACT and state.y[U.L + beside] > 0.0
-    if presses and surface_factor(plant.pairs, state.y, beside, SURFACE) != 0.0:
+    opposite = other(side)
+    presses = state.mode[opposite] == Pair.CONTACT and state.y[U.L + opposite] > 0.0
+    if presses and surface_factor(plant.pairs, state.y, opposite, SURFACE) != 0.0:
         push, pace = other_push(plant, state, side)
         found = first_difference(plant, state.y, side, push, pace, NEXT)
         return found if found.order < NEVER else Deciding(UNDECIDED, 0.0)
-    coming = coming_push(plant, state, beside)
+    coming = coming_push(plant, state, opposite)
     if own.order < coming.order or coming.order == NEVER:
         return own
     return Deciding(coming.order, coming.value + own.value if own.order == coming.order else coming.value)
 
 
 @kernel
-def coming_push(plant: Plant, state: State, beside: Body) -> Deciding:
-    """The first derivative of u of a pair that the force of the pair `beside` moves, which has no force yet.
+def coming_push(plant: Plant, state: State, opposite: Body) -> Deciding:
+    """The first derivative of u of a pair that the force of the pair `opposite` moves, which has no force yet.
 
     The force of a pair that closes from u = 0 like t^n grows like t^(3 n / 2), that of a pair at u' = -1/p like
     u' + 1/p. It moves u of this pair with two powers more. Without a derivative of that order to add to, it is inf.
     """
-    y, mode, pair, mass = state.y, state.mode[beside], plant.pairs[beside], plant.bodies[OBJECT, Of.MASS]
+    y, mode, pair, mass = state.y, state.mode[opposite], plant.pairs[opposite], plant.bodies[OBJECT, Of.MASS]
     if mode not in (Pair.CONTACT, Pair.BEGINNING):
         return Deciding(NEVER, 0.0)
-    u, (order, value) = y[U.L + beside], own_difference(plant, y, beside)
+    u, (order, value) = y[U.L + opposite], own_difference(plant, y, opposite)
     if mode == Pair.CONTACT and u > 0.0:
         return Deciding(order + 1.0, elastic_force(pair[Law.HERTZIAN], u) * pair[Law.DISSIPATION] * value / mass)
-    power = 1.0 if approach(y, beside) != 0.0 else order
+    power = 1.0 if approach(y, opposite) != 0.0 else order
     grows = GROWTH * elastic_force(pair[Law.HERTZIAN], max(0.5 * value, 0.0)) / mass if power == LOWEST else math.inf
     return Deciding(EXPONENT * power + 2.0, grows)
 
@@ -180,12 +180,12 @@ def glides(plant: Plant, state: State, side: Body) -> bool:
     The other one has no force, or glides as well: in a symmetric grasp both are treated alike at one instant. One that
     begins is going to push.
     """
-    beside = other(side)
-    if state.mode[beside] == Pair.BEGINNING or not keeps_rate(plant, state, side):
+    opposite = other(side)
+    if state.mode[opposite] == Pair.BEGINNING or not keeps_rate(plant, state, side):
         return False
-    if state.mode[beside] == Pair.CONTACT and surface_factor(plant.pairs, state.y, beside, SURFACE) != 0.0:
+    if state.mode[opposite] == Pair.CONTACT and surface_factor(plant.pairs, state.y, opposite, SURFACE) != 0.0:
         return False
-    return state.mode[beside] not in (Pair.CONTACT, Pair.CLAMPED) or keeps_rate(plant, state, beside)
+    return state.mode[opposite] not in (Pair.CONTACT, Pair.CLAMPED) or keeps_rate(plant, state, opposite)
 
 
 @kernel

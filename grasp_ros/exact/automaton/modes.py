@@ -213,7 +213,7 @@ def make_transition(plant: Plant, state: State, side: Body, kind: Transition, le
     If rounding makes u' <= 0 at a touch, the pair is at rest, and `settle_resting` decides. If nothing moves a pair off
     u' = -1/p, its CLAMP is due to rounding: the pair `leaves`, without an event.
     """
-    y, mode, d, beside = state.y, state.mode, approach(state.y, side), other(side)
+    y, mode, d, opposite = state.y, state.mode, approach(state.y, side), other(side)
     if kind in (Transition.TOUCH, Transition.RELEASE):
         meet(state, side)  # the places agree but for rounding
     if kind == Transition.TOUCH and d <= 0.0:
@@ -222,8 +222,8 @@ def make_transition(plant: Plant, state: State, side: Body, kind: Transition, le
     if leaves:
         mode[side] = Pair.LEAVING
         return
-    if kind == Transition.TOUCH and mode[beside] == Pair.LEAVING:
-        mode[beside] = Pair.CONTACT  # the force of this pair may turn it back
+    if kind == Transition.TOUCH and mode[opposite] == Pair.LEAVING:
+        mode[opposite] = Pair.CONTACT  # the force of this pair may turn it back
     if kind == Transition.CLAMP:
         mode[side] = Pair.CLAMPED
     else:

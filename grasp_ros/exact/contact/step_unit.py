@@ -94,8 +94,8 @@ def turning_rate(plant: Plant, state: State, side: Body) -> tuple[float, float]:
     d, a = relative_motion(plant, state.y, side)
     w, v = impact_scales(hertzian, mu, u, d)
     a = abs(a)
-    beside = other(side)
-    if state.mode[beside] == Pair.CONTACT:
+    opposite = other(side)
+    if state.mode[opposite] == Pair.CONTACT:
         a += abs(other_push(plant, state, side)[0])
     rate = max(v * near_inverse(w) if w > 0.0 else 0.0, math.sqrt(2.0 * a))
     stiff = plant.pairs[side, Law.DISSIPATION] * hertzian / mu

@@ -121,9 +121,9 @@ class Monitor(PeerNode):
         """Record, once it is known what runs and how."""
         if (scene := self._scene) is None or (running := self._running) is None:
             return
-        beside = [] if running.lockstep else [topics.TIMING, *scene.controllers.values()]
-        self._commands = {topic: deque(maxlen=topics.DEPTH + scene.system.delay) for topic in beside[1:]}
-        per_tick = [topic for topic in scene.topics if topic != topics.LYAPUNOV and topic not in beside]
+        extra = [] if running.lockstep else [topics.TIMING, *scene.controllers.values()]
+        self._commands = {topic: deque(maxlen=topics.DEPTH + scene.system.delay) for topic in extra[1:]}
+        per_tick = [topic for topic in scene.topics if topic != topics.LYAPUNOV and topic not in extra]
         self._lyapunov, self._picture = LyapunovMonitor(scene), Picture(self, scene)
         self._synchronizer = Synchronizer(
             [topic for topic in per_tick if topic != topics.JOINT_STATES],
@@ -144,7 +144,7 @@ class Monitor(PeerNode):
             subscription = self.subscribe(topic, partial(self._on_message, topic), raw=True)
             if topic in topics.COMMANDS.values():
                 self._sources[topic] = Sources(subscription, UNCERTAIN_SECONDS)
-        for topic in (*beside, topics.DIAGNOSTICS):
+        for topic in (*extra, topics.DIAGNOSTICS):
             self._others.append(self.subscribe(topic, partial(self._record, topic), raw=True))
 
     def _record(self, topic: Topic, cdr: bytes) -> None:
@@ -237,11 +237,11 @@ class Monitor(PeerNode):
             self.take_waiting(self._laws)
         due[0][2].extend(self._lyapunov.begin(due[0][1].time_ns))
         rows = self._lyapunov.evaluate([tick for _, tick, _ in due])
-        for (bag_ns, tick, beside), values in zip(due, rows, strict=True):
+        for (bag_ns, tick, extra), values in zip(due, rows, strict=True):
             self.count("ticks")
             self._picture.show(tick.state)
             own = self._published = self._template.fill(tick.time_ns, values)
-            self._recorder.write_tick(bag_ns, [*beside, *tick.found.items(), (topics.LYAPUNOV, own)], tick.time_ns)
+            self._recorder.write_tick(bag_ns, [*extra, *tick.found.items(), (topics.LYAPUNOV, own)], tick.time_ns)
             self._output.publish(own)
             self._check_energy(tick, named(values))
             self._at_end = tick.time_ns == self._synchronizer.end_ns
