@@ -276,7 +276,7 @@ def test_numbers_that_were_announced_at_a_tick_that_is_lost_act_from_the_next_on
 ) -> None:
     """Else V and the law of all that follows would be those of other numbers."""
     numbers = {**run.scene.numbers_of("left_controller"), "left_feedback.position_gain_N_per_m": 9.0}
-    announcement = list_message(ticks[5][0], [*numbers], [*numbers.values()], frame="1")
+    announcement = list_message(ticks[5][0], [*numbers], [*numbers.values()], frame="2")
     ticks[5] = (ticks[5][0], [(topics.CHANGES["left"], announcement), *(ticks[5][1][row] for row in whole)])
     written(tmp_path / "bag", run.scene, ticks)
     found = recover(tmp_path / "bag", tmp_path / "new")
