@@ -18,6 +18,7 @@ from typing import Any
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_directory, add_scene, named, sides_of
 from grasp_ros.cli.bags import add_limits, check_limits, keeps
 from grasp_ros.cli.checks import load_scene, prepare
+from grasp_ros.cli.output import has_notes
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
 from grasp_ros.graph.bag import BagError, EmptyBagError
 from grasp_ros.graph.host import check_reach, hold, network
@@ -110,7 +111,7 @@ def _run(options: argparse.Namespace) -> int:
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
     check_limits(options, lockstep=options.free_running is None)
     Running(options.accuracy)  # refuses what is wrong before anything is there, as those around it do
-    plant: dict[str, bool | float | str] = {"paused": options.paused, "progress": True}
+    plant: dict[str, bool | float | str] = {"paused": options.paused, "progress": has_notes()}
     if options.free_running is not None:
         check_factor(options.free_running, "--free-running")
         plant.update(free_running=True, real_time_factor=options.free_running, wait_for_controllers=True)
@@ -122,7 +123,7 @@ def _run(options: argparse.Namespace) -> int:
     graph = Graph(
         scene, directory, options.accuracy, without=options.without, laws=laws, plant=plant,
         one_process=options.one_process, namespace=options.namespace, peer_timeout=options.peer_timeout,
-        on_silence=options.on_silence,
+        on_silence=options.on_silence, quiet=not has_notes(),
     )
     try:
         stopped = _live(graph, spent)

@@ -30,9 +30,14 @@ def set_level(options: argparse.Namespace) -> None:
     LOG.setLevel(logging.ERROR if getattr(options, "quiet", False) else logging.WARNING)
 
 
+def has_notes() -> bool:
+    """Whether there are notes and progress bars: not of a command that is quiet."""
+    return LOG.isEnabledFor(logging.WARNING)
+
+
 def note(text: str) -> None:
     """Print a note to the standard error output, unless the command is quiet."""
-    if LOG.isEnabledFor(logging.WARNING):
+    if has_notes():
         print(text, file=sys.stderr)
 
 
@@ -40,7 +45,7 @@ def bar(total: float | None, unit: str, name: str) -> AbstractContextManager[Cal
     """A bar on a terminal, see `simulation.progress`; None where there is none."""
     from grasp_ros.simulation.progress import showing  # with the compiler, which a graph does not need
 
-    return showing(LOG.isEnabledFor(logging.WARNING), total, unit, name)
+    return showing(has_notes(), total, unit, name)
 
 
 def show(options: argparse.Namespace, text: str, data: Any) -> None:

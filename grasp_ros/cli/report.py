@@ -123,11 +123,12 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
     of = "" if recording.closed else f" of {PLANT_ALONE}"
     left, right = found["contacts"].values()
     balanced, known = found["balanced_ticks"], not np.isnan(found["work_J"])
-    lacks = balanced < found["ticks"]  # numbers of the monitor
+    lacks = np.isnan(recording.lyapunov).all(axis=1).any()  # numbers of the monitor
     unknown = np.count_nonzero(~recording.law_known)
     none = "unknown: lyapunov missing" if lacks else (
-        f"none: at {unknown} of {found['ticks']} ticks the commands are not those of a known law")
-    closes = "closes at every tick" if known else f"closes at {balanced} ticks, others are not known"
+        f"none: at {unknown} of {found['ticks']} ticks the monitor did not know the law of the commands")
+    closes = "closes at every tick" if known else (
+        f"closes at {balanced} of {recording.tick[-1] + 1} ticks, the others are not known")
     topics: dict[tuple[float, float], list[str]] = {}  # by how many messages they have, and how often
     for name, numbers in found["topics"].items():
         rate = 0.0 if np.isnan(numbers["rate_Hz"]) else numbers["rate_Hz"]
@@ -171,7 +172,8 @@ def describe_verification(verification: Verification) -> list[Row]:
     rows = [(f"{side} controller", str(found)) for side, found in verification.answers.items()]
     rows.append(("verified", verification.words))
     if verification.same is not None:
-        rows.append(("same without ROS", "equal, bit for bit" if verification.same else "NOT EQUAL"))
+        rows.append(("same without ROS", "equal, bit for bit: the states and commands of every recorded tick"
+                     if verification.same else "NOT EQUAL"))
     return rows
 
 

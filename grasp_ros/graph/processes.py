@@ -67,6 +67,7 @@ class Graph:
     namespace: str = "/"  # of all names, /clock too where it is not the root
     peer_timeout: float = PEER_SECONDS  # wall time without a heartbeat, or an answer, after which a node is silent
     on_silence: str = "end"  # what the others do then; or "wait"
+    quiet: bool = False  # whether the nodes log errors alone
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
     begun: float | None = None  # wall time at which the bag was there
     _stopped: dict[str, float] = field(default_factory=dict)  # since when
@@ -142,10 +143,13 @@ class Graph:
 
     def _commands(self, settings: Mapping[str, Values]) -> dict[str, list[str]]:
         """Command lines by the names of the processes."""
-        if not self.one_process:
-            return {name: _command(["child", name], numbers, self.namespace) for name, numbers in settings.items()}
-        together = {f"{name}:{key}": value for name, numbers in settings.items() for key, value in numbers.items()}
-        return {"graph": _command(["child", "graph", *settings], together, self.namespace)}
+        nodes = {name: ((name,), numbers) for name, numbers in settings.items()}
+        if self.one_process:
+            together = {f"{name}:{key}": value for name, numbers in settings.items() for key, value in numbers.items()}
+            nodes = {"graph": (("graph", *settings), together)}
+        level = ["--log-level", "error"] if self.quiet else []
+        return {name: [*_command(["child", *own], numbers, self.namespace), *level]
+                for name, (own, numbers) in nodes.items()}
 
     def wait(self, received: Sequence[int]) -> None:
         """Wait until plant and monitor have finished, or until a signal has been received.

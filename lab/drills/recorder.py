@@ -23,7 +23,7 @@ from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
-from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, Topic
+from grasp_ros.scene.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, Topic
 from grasp_ros.simulation import Trajectory, simulate
 
 LONGEST_SECONDS = 1.0  # after which a recording is killed at the latest
@@ -53,7 +53,11 @@ def ticks_of(run: Trajectory) -> Iterator[Tick]:
         own = [*(float(column[tick]) for column in columns), 1.0]
         rest = [(topic, force_message(time_ns, force)) for topic, force in forces.items()]
         lyapunov = list_message(time_ns, LYAPUNOV_NAMES, own)
-        yield time_ns, [(JOINT_STATES, states), *rest, (LYAPUNOV, lyapunov)]
+        laws = {} if tick else {side: scene.numbers_of(f"{side}_controller") for side, command in COMMANDS.items()
+                                if command in scene.topics}
+        beside = [(CHANGES[side], list_message(0, [*numbers], [*numbers.values()], frame="1"))
+                  for side, numbers in laws.items()]
+        yield time_ns, [*beside, (JOINT_STATES, states), *rest, (LYAPUNOV, lyapunov)]
 
 
 def write(path: Path, run: Trajectory) -> None:

@@ -23,8 +23,10 @@ from rclpy.parameter_client import AsyncParameterClient
 from sensor_msgs.msg import JointState
 
 from grasp_ros import scene
+from grasp_ros.cli import report
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.recorder import HEAD
+from grasp_ros.graph.bag.summary import summary
 from grasp_ros.graph.bag.verify import answers_of, laws_of, verify
 from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.ros import messages
@@ -79,16 +81,26 @@ def test_an_input_that_differs_is_found_and_a_bag_may_end_early_but_lack_no_tick
     assert words.startswith("100 states follow from the recorded inputs, bit for bit; tick 100 is missing")
 
 
-def test_a_bag_that_begins_late_is_not_verified_and_says_why(two_runs: tuple[Path, Path]) -> None:
-    """Of a monitor that came to a plant that does not wait for it."""
+def test_a_bag_that_begins_late_says_what_was_compared_and_why_no_more(two_runs: tuple[Path, Path]) -> None:
+    """Of a monitor that came to a plant that does not wait for it, and knew the laws later still."""
     recording = bag.read(two_runs[0] / "bag")
-    late = replace(
-        recording, starts=recording.starts[:0], outputs={name: rows[100:] for name, rows in recording.outputs.items()},
-        **{name: getattr(recording, name)[100:] for name in ("tick", "state", "effort", "command", "lyapunov")},
-    )
+    rows = {name: getattr(recording, name)[100:].copy() for name in ("tick", "state", "effort", "command", "lyapunov")}
+    rows["lyapunov"][:50, LYAPUNOV_NAMES.index("closed")] = 0.0
+    late = replace(recording, starts=recording.starts[:0], **rows, outputs={
+        name: values[100:] for name, values in recording.outputs.items()})
     found = verify(late)
-    assert found.words == "nothing: the bag begins at tick 100, not at the beginning of the scene"
+    words = dict(report.describe_recording(late, summary(late)) + report.describe_verification(found))
+    assert words["verified"] == ("nothing from the recorded inputs: the bag begins at tick 100, not at the beginning of"
+                                 " the scene")
+    assert words["same without ROS"] == "equal, bit for bit: the states and commands of every recorded tick"
+    assert words["energy balance"] == "closes at 2900 of 3001 ticks, the others are not known"
+    assert words["certificate"] == "none: at 50 of 2901 ticks the monitor did not know the law of the commands"
     assert not found.holds
+    stiffer = {"left_feedback.position_gain_N_per_m": 9.0}  # who came at tick 100 cannot know from when on
+    changed = simulate(recording.scene, sampled=True, changes={50: stiffer})
+    found = verify(replace(late, state=changed.state[100:], command=changed.command[100:], changes={100: stiffer}))
+    assert not found.answers["left"].differs
+    assert found.same is None
 
 
 CONVERTED = [
@@ -177,7 +189,7 @@ def test_what_does_not_follow_without_the_messages_that_a_bag_lacks_is_not_told(
     name, number = next(iter(lost.items()))
     assert (verified.returncode, f"the bag lacks {name} of {number} ticks" in verified.stdout) == (1, True)
     if "lyapunov" in lost:
-        assert f"closes at {tick} ticks, others are not known" in command("inspect", "new.mcap").stdout
+        assert f"closes at {tick} of 3001 ticks, the others are not known" in command("inspect", "new.mcap").stdout
 
 
 def test_the_directory_of_a_run_is_no_bag_and_says_where_it_is(two_runs: tuple[Path, Path], command: Any) -> None:

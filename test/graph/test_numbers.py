@@ -270,10 +270,17 @@ def test_another_scene_is_refused_and_said_to_be_left_out(tmp_path: Path, run: T
     assert recover(tmp_path / "bag", tmp_path / "new").left_out == [f"parts of 1 ticks, the first 5: {why}"]
 
 
-def test_what_lies_beside_a_tick_that_is_lost_is_said_to_be_left_out(
-    tmp_path: Path, run: Trajectory, ticks: Ticks
+@pytest.mark.parametrize("whole", [[], [0]])
+def test_numbers_that_were_announced_at_a_tick_that_is_lost_act_from_the_next_one_on(
+    tmp_path: Path, run: Trajectory, ticks: Ticks, whole: list[int]
 ) -> None:
-    ticks[5] = (ticks[5][0], [(topics.DIAGNOSTICS, bytes(16))])
+    """Else V and the law of all that follows would be those of other numbers."""
+    numbers = {**run.scene.numbers_of("left_controller"), "left_feedback.position_gain_N_per_m": 9.0}
+    announcement = list_message(ticks[5][0], [*numbers], [*numbers.values()], frame="2")
+    ticks[5] = (ticks[5][0], [(topics.CHANGES["left"], announcement), *(ticks[5][1][row] for row in whole)])
     written(tmp_path / "bag", run.scene, ticks)
-    [left] = recover(tmp_path / "bag", tmp_path / "new").left_out
-    assert left.startswith("parts of 1 ticks, the first 5: no message on contact/left, ")
+    found = recover(tmp_path / "bag", tmp_path / "new")
+    assert (found.ticks, found.missing) == (10, "5")
+    assert [left.partition(": no message on ")[0] for left in found.left_out] == [
+        "parts of 1 ticks, the first 5"] * len(whole)
+    assert bag.read(tmp_path / "new").changes == {6: {"left_feedback.position_gain_N_per_m": 9.0}}

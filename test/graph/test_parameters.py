@@ -212,6 +212,19 @@ def test_an_announcement_that_is_lost_is_seen_in_the_bag(tmp_path: Path) -> None
     assert verify(recording).words == followed
 
 
+def test_a_bag_that_lacks_every_announcement_has_the_energy_of_its_monitor(tmp_path: Path) -> None:
+    """Of a bag that was filtered, say: the monitor knew another law than the scene's, and nobody else does."""
+    before = scene.load("arm_alone", ["time.duration_s=0.004"])
+    stiffer = simulate(before.changed({GAIN: 9.0}), sampled=True)
+    ticks = [(time_ns, [row for row in rows if row[0] != CHANGES["left"]])
+             for time_ns, rows in recorder.ticks_of(stiffer)]
+    recording = bag.read(written(tmp_path / "bag", before, ticks))
+    assert recording.missing["left/parameters"] == 1
+    assert np.array_equal(recording.energy.V, stiffer.energy.V)
+    assert laws_of(recording) == {"left": "not known: the bag lacks 1 announcements of its numbers"}
+    assert verify(recording).difference is None
+
+
 def test_help_names_what_can_be_set(
     loop: tuple[Any, ...], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -269,7 +282,7 @@ ASKING = "def law(tick, time, x, v, x_object):\n    return x_object - x\n"
 CAMERA = "class law:\n    def __init__(self):\n        raise ValueError('no camera')\n"
 NOT_BEGUN = [  # variables of the environment, the law, and what is said of them
     ("ROS_LOG_DIR=/proc/nowhere", CAMERA, "ROS does not start: .*'/proc/nowhere'.* ROS_LOG_DIR=/proc/nowhere"),
-    ("ROS_SECURITY_ENABLE=true ROS_SECURITY_STRATEGY=Enforce", CAMERA, "not start: .*ROS_SECURITY_STRATEGY=Enforce"),
+    ("ROS_SECURITY_ENABLE=true ROS_SECURITY_STRATEGY=Enforce", CAMERA, "it does not say why; .*ROS_SECURITY_STR"),
     ("ROS_STATIC_PEERS=no.such.host.invalid", CAMERA, "Unable to resolve peer no.such.host.* ROS_STATIC_PEERS=no"),
     ("", CAMERA, "grasp: left_controller: law: laws:law: .* cannot be initialised: ValueError: no camera, .*line 3$"),
     ("", ASKING, "asks for x_object; the scene has no object"),

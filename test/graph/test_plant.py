@@ -233,3 +233,17 @@ def test_who_answers_a_state_that_was_published_again_is_not_blamed(
     for _ in range(2):
         loop._on_command(LEFT, left, second)
     assert "left/effort_command: repeated commands: 2; sources seen: " in capfd.readouterr().err
+
+
+def test_who_answers_only_when_asked_again_is_named(make: Any, capfd: pytest.CaptureFixture[str]) -> None:
+    """One that answers a state when the next one comes, say: the graph would crawl without a word."""
+    plant = make(Plant, scene="case_01", wait_for_monitor=False)
+    plant.begun, loop, (left, right) = True, plant.loop, plant.scene.controllers.values()
+    for tick in range(2):
+        assert "late answers" not in capfd.readouterr().err
+        plant.published_at = 0.0
+        loop._on_command(LEFT, left, force_message(tick * plant.scene.period_ns, 0.0))
+        loop.ask_again(10.0 * (tick + 1))
+        loop._on_command(RIGHT, right, force_message(tick * plant.scene.period_ns, 0.0))
+    assert (plant.tick, plant.counters["repeated states"], plant.counters["late answers"]) == (2, 2, 1)
+    assert "right/effort_command: late answers: 1; sources seen: " in capfd.readouterr().err

@@ -51,6 +51,14 @@ def test_a_process_that_cannot_be_started_is_named(tmp_path: Path, monkeypatch: 
     graph.stop()
 
 
+@pytest.mark.parametrize("options", [[], ["--one-process"]], ids=["four processes", "one process"])
+def test_a_quiet_run_prints_its_results_alone(tmp_path: Path, options: list[str]) -> None:
+    words = ["run", "case_01", "--quiet", "--set", "time.duration_s=0.1", "--no-figure", "-o", "run", *options]
+    found = ran(*GRASP, *words, cwd=tmp_path)
+    assert (found.returncode, found.stderr) == (0, "")
+    assert found.stdout.startswith("bag  ")
+
+
 @pytest.mark.usefixtures("survivors")
 @pytest.mark.parametrize("options", [[], ["--one-process"]], ids=["four processes", "one process"])
 def test_nothing_outlives_a_run_that_is_killed(grasp_run: Any, tmp_path: Path, options: list[str]) -> None:

@@ -73,6 +73,9 @@ def _recording(opened: Opened) -> Recording:
     ends = np.cumsum([template.count for template in reader.topics.values()])[:-1]
     parts = dict(zip(reader.topics, np.split(np.array(rows).reshape(len(times), -1), ends, axis=1), strict=True))
     state, effort, command = _motion(scene, ticks, parts)
+    if 1.0 in parts[topics.LYAPUNOV][:, topics.LYAPUNOV_NAMES.index("closed")]:  # the monitor had heard of all laws
+        laws = (topics.CHANGES[side] for side, topic in topics.COMMANDS.items() if topic in scene.topics)
+        reader.unheard.update(topic.name for topic in laws if not counts[topic])
     timing = zip(reader.quality, np.array(reader.timing).T, strict=True) if reader.timing else ()
     return Recording(
         path=opened.path, scene=scene, versions=opened.versions, running=opened.running, tick=ticks, state=state,

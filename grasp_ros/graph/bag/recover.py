@@ -11,8 +11,9 @@ from grasp_ros.graph.bag import BagError
 from grasp_ros.graph.bag.opening import UNREADABLE, Opened
 from grasp_ros.graph.bag.reading import BagReader
 from grasp_ros.graph.bag.recorder import LEFT_OUT, SOURCE, Recorder
+from grasp_ros.graph.bag.storage import Stored
 from grasp_ros.physics.errors import printable
-from grasp_ros.scene.topics import CLOCK, RUN, SCENE
+from grasp_ros.scene.topics import CLOCK, RUN, SCENE, Topic
 
 MOST_REASONS = 20  # that are listed
 TICK = re.compile(r"\b(tick \d+: |\d+ ns; )")  # which is noted beside the reason
@@ -36,7 +37,7 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
     """
     opened, refused, written = Opened(path, salvage=True), dict[str, list[int]](), 0
     scene, reader, recorder = opened.scene, BagReader(opened), None
-    wanted = {*reader.topics} - {CLOCK}
+    wanted, beside = {*reader.topics} - {CLOCK}, list[tuple[Topic, Stored]]()
 
     def note(error: Exception, tick: int) -> None:
         """Note a tick by the reason for which something of it is refused."""
@@ -46,6 +47,9 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
     try:
         for time_ns, tick, others in reader.ticks(wanted):
             number = time_ns // scene.period_ns
+            beside += others  # numbers that were announced at a tick that is lost act at those that follow
+            if not tick:
+                continue
             try:
                 if missing := sorted(topic.name for topic in wanted - tick.keys()):
                     raise BagError(f"no message on {', '.join(missing)}")
@@ -56,14 +60,15 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
             recorder = recorder or Recorder(Path(new), scene, opened.versions, opened.names, opened.running)
             recorder.write_tick(time_ns, tick.items(), reader.stamp_ns)
             written += 1
-            for topic, stored in others:
+            for topic, stored in beside:
                 try:
                     reader.take(topic, stored)
                 except UNREADABLE as error:
-                    note(error, number)
+                    note(error, stored.time_ns // scene.period_ns)
                     continue
                 if topic not in (SCENE, RUN, CLOCK):  # which the recorder writes itself
                     recorder.write(topic, stored.cdr)
+            beside.clear()
     finally:
         left_out = [f"{size} bytes from byte {offset} on: {why}" for offset, size, why in opened.storage.unread]
         left_out += [f"{why}: {count}" for why, count in opened.left_out.items()]

@@ -53,7 +53,8 @@ def summary(recording: Recording) -> dict[str, Any]:
 def _levels(recording: Recording) -> dict[str, Any]:
     """Contacts, energies and their balance; the work is NaN where the monitor's numbers are not whole."""
     work, alarm = (recording.lyapunov[:, LYAPUNOV_NAMES.index(name)] for name in ("work", "alarm"))
-    balanced, level = int(np.count_nonzero(~np.isnan(work + alarm))), recording.energy
+    follows = np.diff(recording.tick, prepend=-1) == 1  # else the monitor knows no energy before
+    balanced, level = int(np.count_nonzero(follows & ~np.isnan(work + alarm))), recording.energy
     whole = balanced == recording.tick[-1] + 1
     return {
         "contacts": {side: _beginnings(recording, level.mode, flag)

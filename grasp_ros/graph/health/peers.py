@@ -124,6 +124,7 @@ class PeerNode(GraspNode):
         if not self.begun:
             waited = now - max(self._first_look, self.heartbeats.prepared)
             self.concern = f"for {waited:.0f} s" if waited > self.patience else ""
+            self.get_logger().info(self.words, throttle_duration_sec=PATIENCE_SECONDS, skip_first=True)
             if waited > self.start_patience and self._ends:
                 self.fail(f"{self.words}; timeout of {self.start_patience:g} s")
             return

@@ -27,6 +27,7 @@ if TYPE_CHECKING:  # it imports this one
 REPEAT_SECONDS, FIRST_SECONDS = 1.0, 0.4  # the first state is the one that a reader may miss: it has just come
 SETTLE_SECONDS = 0.3  # after a source has come or gone; its messages are here by then
 NAMES_SECONDS = 2.0  # for discovery to tell the name of a source
+LATE_TICKS = 10  # a second state within them that is not answered at once: somebody answers when asked again alone
 UNCONTROLLED_SECONDS = 1e-4  # wall time between the ticks of a scene without controllers
 
 
@@ -41,7 +42,7 @@ class Lockstep:
         self._timer: Any = None
         plant.counters.update({
             "stale commands": 0, "repeated commands": 0, "refused commands": 0, "commands beyond a limit": 0,
-            "commands while sources change": 0, "repeated states": 0,
+            "commands while sources change": 0, "late answers": 0, "repeated states": 0,
         })
         self.topics = list(plant.scene.controllers.values())
         self._sources = {
@@ -85,7 +86,16 @@ class Lockstep:
         if self._unsettled:
             self._settle(now)
         elif (self._ahead or not self._complete) and now - since > patience:
+            self._name_late()
             self._repeat(now)
+
+    def _name_late(self) -> None:
+        """Say who answers so late that the graph crawls: no deadline is missed, for each state is answered at last."""
+        period_ns = self._plant.scene.period_ns
+        if self._asked_ns >= 0 and 0 < self._plant.tick * period_ns - self._asked_ns <= LATE_TICKS * period_ns:
+            for side, topic in zip(self._plant.scene.system.laws, self.topics, strict=True):
+                if side not in self._commands:
+                    self._plant.refuse("late answers", topic, f"a state is published again after {REPEAT_SECONDS:g} s")
 
     def _repeat(self, now: float) -> None:
         self._asked, self._asked_ns = now, self._plant.tick * self._plant.scene.period_ns

@@ -254,9 +254,9 @@ class Monitor(PeerNode):
 
     def _check_energy(self, tick: Tick, values: Mapping[str, float]) -> None:
         """Say why V is not there; end where energy comes from nowhere."""
+        self.concern, unknown = "", self._lyapunov.unknown
         if not values["closed"]:
             self.count("ticks without V")
-            unknown = self._lyapunov.unknown
             self.concern = (f"no law announced by {' and '.join(unknown)}: energy of the plant alone" if unknown else
                             "commands are not those of the announced law: energy of the plant alone")
         if values["alarm"]:

@@ -139,8 +139,6 @@ class GraspNode(ParameterNode):
             if ready():
                 timer.cancel()
                 action()
-            else:
-                self.get_logger().info(self.words, throttle_duration_sec=PATIENCE_SECONDS, skip_first=True)
 
         timer = self.wall_timer(PEER_SECONDS, poll)
 

@@ -183,6 +183,8 @@ def refusing() -> Iterator[None]:
 def words_of(error: RuntimeError) -> str:
     """What rcl says, without where in it, and what it was given: words of the command line, and variables."""
     variables = [f"{name}={value}" for name, value in sorted(os.environ.items()) if name.startswith(OF_ROS)]
-    why = " ".join(str(error).split()).partition(", at /")[0].replace("error not set", "nothing behind :=")
+    why = " ".join(str(error).split()).partition(", at /")[0]
+    why = why.replace("Error: error not set", "Error: nothing behind :=")
+    why = why.replace("error not set", "it does not say why")
     unknown = "unknown arguments " if isinstance(error, UnknownArguments) else ""
     return f"{unknown}{why}; it was given {' '.join([*sys.argv[1:], *variables])}"
