@@ -16,6 +16,9 @@ from grasp_ros.scene.files import YAML
 from grasp_ros.simulation.outcomes import GROUPS
 
 END = "  an end of its range: a wider one may have a better choice"
+NO_EFFECT = "  no effect: no value of its range changes the outcome"
+SAME = 1e-12  # relative, of outcomes
+POINTS = 9  # values over a range, which show whether a number has an effect
 INSIDE = np.array([1e-6, 1.0 - 1e-6])  # the part of a range that is not its ends
 RANGE = "section.key[+section.key]=low:high[::log]"
 
@@ -80,7 +83,8 @@ def _table(problem: Any, found: Sequence[Any]) -> list[str]:
         numbers = found[0].numbers
         ends = {key for axis in problem.axes for low, high in [axis.at(INSIDE)] for key in axis.keys
                 if not low < numbers[key] < high}
-        rows = [*((key, f"{value:.10g}{END if key in ends else ''}") for key, value in numbers.items()),
+        notes = {**dict.fromkeys(ends, END), **dict.fromkeys(_without_effect(problem, found[0]), NO_EFFECT)}
+        rows = [*((key, f"{value:.10g}{notes.get(key, '')}") for key, value in numbers.items()),
                 *((name, f"{value:.10g}{units[name]}") for name, value in found[0].outcomes.items()),
                 ("simulations", str(found[0].runs))]
         return [table(rows)]
@@ -90,3 +94,15 @@ def _table(problem: Any, found: Sequence[Any]) -> list[str]:
               *(f"{own.numbers[axis.keys[0]]:.8g}" for axis in problem.axes)] for own in found]
     widths = [max(map(len, column)) for column in zip(heads, *lines, strict=True)]
     return ["  ".join(f"{cell:>{width}}" for cell, width in zip(line, widths, strict=True)) for line in [heads, *lines]]
+
+
+def _without_effect(problem: Any, choice: Any) -> list[str]:
+    """Free numbers that the outcome does not depend on, with the others as they were chosen."""
+    keys: list[str] = []
+    name = problem.minimise[0]
+    for axis in problem.axes:
+        found = problem.along(axis, choice.numbers, POINTS)[1]
+        same = np.isclose(found.outcomes[name], choice.outcomes[name], rtol=SAME, atol=0.0)
+        if same.all() and not found.excess.any():
+            keys += axis.keys
+    return keys

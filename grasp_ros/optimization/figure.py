@@ -21,9 +21,7 @@ def around(problem: DesignProblem, choice: Design) -> Figure:
     count, name = len(problem.axes), problem.minimise[0]
     figure, row = canvas.subplots(1, count, figsize=(4.2 * count + 1.0, 3.6), squeeze=False, sharey=True)
     for axis, axes in zip(problem.axes, row[0], strict=True):
-        values = axis.at(np.linspace(0.0, 1.0, POINTS))
-        numbers = {key: np.full(POINTS, value) for key, value in choice.numbers.items()}
-        found = problem.found({**numbers, **dict.fromkeys(axis.keys, values)})
+        values, found = problem.along(axis, choice.numbers, POINTS)
         good = found.excess == 0.0
         axes.plot(values, found.outcomes[name], color="0.8", linewidth=1.0)
         axes.plot(values, np.where(good, found.outcomes[name], np.nan), linewidth=1.2)

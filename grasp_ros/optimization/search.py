@@ -94,14 +94,19 @@ class DesignProblem:
     def found(self, numbers: Mapping[str, Array]) -> Found:
         """Simulate choices, given as free numbers (n,) by their keys."""
         table = ensemble(self.scene, numbers, self.names, setup=self.setup)
-        outcomes: dict[str, Array] = {}
-        for name, columns in self._columns.items():
-            worst = np.fmax.reduce([table.columns[column.name] for column in columns])  # nan: an absent body
-            outcomes[name] = np.where(np.isnan(worst), np.inf, worst)  # a run without it is as bad as can be
+        worst = {name: np.fmax.reduce([table.columns[column.name] for column in columns])  # nan: an absent body
+                 for name, columns in self._columns.items()}
+        outcomes = {name: np.where(np.isnan(own), np.inf, own) for name, own in worst.items()}  # none: as bad as can be
         excess: Array = np.zeros(len(table.status))
         for bound in self.bounds:
             excess += np.maximum(outcomes[bound.outcome] - bound.most, 0.0) / (abs(bound.most) or 1.0)
         return Found(outcomes, excess, [*table.stops.values()])
+
+    def along(self, axis: Axis, numbers: Mapping[str, float], count: int) -> tuple[Array, Found]:
+        """Values (count,) over the range of one free number, and what is found of them with the others as they are."""
+        values = axis.at(np.linspace(0.0, 1.0, count))
+        others = {key: np.full(count, value) for key, value in numbers.items()}
+        return values, self.found({**others, **dict.fromkeys(axis.keys, values)})
 
 
 def read_bound(text: str) -> Bound:
@@ -218,8 +223,7 @@ def search(problem: DesignProblem, seed: int = 0, progress: Callback | None = No
     points = np.vstack([ends, single, found.x])  # a population may stop just before an end
     reached = function(points.T)
     least = float(reached.min())
-    best_point = points[int(np.argmax(reached <= least + AGREE * abs(least)))]
-    best = problem.numbers(best_point[None])
+    best = problem.numbers(points[[int(np.argmax(reached <= least + AGREE * abs(least)))]])
     tried = problem.found(best)
     if least >= BROKEN:
         wish = " and ".join(f"{name} <= {most:g}" for name, most in problem.bounds)
@@ -269,8 +273,7 @@ def front(problem: DesignProblem, seed: int = 0, progress: Callback | None = Non
     """The Pareto front of the two outcomes of a problem, from the first outcome's best on.
 
     Each has the smallest first outcome for a bound on the second one; the bounds are even between the two ends. One
-    under which no choice has the first outcome gives none. Of choices that are equal in both the first is kept. See
-    `search`.
+    under which no choice has the first outcome gives none. Of equal choices the first is kept. See `search`.
     """
     if len(problem.minimise) != 2:
         raise Refused(f"minimise: {', '.join(problem.minimise)}; allowed: two outcomes for a curve")

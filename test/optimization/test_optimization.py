@@ -177,3 +177,12 @@ def test_the_command_writes_a_scene_and_figures(command: Any, tmp_path: Path) ->
     inside = command("design", "case_01", "--set", "time.duration_s=3", "--free", *wide)  # at 1.2
     assert inside.returncode == 0, inside.stderr
     assert "an end of its range" not in inside.stdout
+
+
+def test_a_number_without_effect_on_the_outcome_is_named(command: Any) -> None:
+    """The largest input is the one at the start, as long as the damping is small: whatever the contacts are."""
+    free = "--free", "left_contact.hertz_N_per_m1_5=1e3:1e5", "--free", "left_feedback.velocity_gain_Ns_per_m=0.5:10"
+    result = command("design", "case_01", "--set", "time.duration_s=3", *free, "--minimise", "peak_input")
+    assert result.returncode == 0, result.stderr
+    assert [line.split()[0] for line in result.stdout.splitlines() if "no effect" in line] == [
+        "left_contact.hertz_N_per_m1_5"]
