@@ -35,7 +35,7 @@ MODULES = {  # and the files of their tests
 SAMPLED = {  # not every branch is tested there
     "automaton.friction": ("modes", "friction"), "flight.search": ("flight",), "numerics.roots": ("roots",),
 }
-LONGEST_S = 600  # of the tests of a mutant
+LONGEST_S = 120  # of the tests of a mutant
 EDGES = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq}
 OPERATIONS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult}
 EQUIVALENT: dict[str, str] = {
