@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from exact.bench import ORDER, SIDES, TOLERANCE, Bench, bench
+from scipy.optimize import minimize_scalar
 
 from grasp_ros.exact.automaton.friction import (
     apply_friction,
@@ -183,13 +184,18 @@ def test_an_object_that_moves_against_the_mode_of_its_friction_stops_at_once(sli
     assert turned > 0.2 * DRAWS
 
 
+def step(b: Bench) -> tuple[Tables, int, float]:
+    """A Taylor step from a state, its order and its length."""
+    apply_friction(b.plant, b.state.mode)
+    tables = new_workspace(ORDER).tables
+    segment = take_step(tables, b.plant, b.state, b.settings, np.inf, np.zeros(len(Work), dtype=np.int64))
+    return tables, segment.step.order.number, segment.s
+
+
 def first_event(b: Bench) -> tuple[float, Slide, Array]:
     """When the object stops or slips within the Taylor step from a state, s; what it does; the values there."""
-    apply_friction(b.plant, b.state.mode)
-    tables, work = new_workspace(ORDER).tables, np.zeros(len(Work), dtype=np.int64)
-    segment = take_step(tables, b.plant, b.state, b.settings, np.inf, work)
-    n, h = segment.step.order.number, segment.s
-    found = slide_in_contact(tables, b.plant, b.state, n, h, work)
+    tables, n, h = step(b)
+    found = slide_in_contact(tables, b.plant, b.state, n, h, np.zeros(len(Work), dtype=np.int64))
     if not found.when <= h:
         return math.inf, Slide.STUCK, tables.at
     values(tables.c, n, found.when, tables.at)
@@ -268,3 +274,27 @@ def test_a_slip_hidden_by_impacts_that_balance_is_found_when_they_are_weaker(sid
     _, what, at = first_event(b)
     assert what is forward(side, Slide.RIGHTWARD)
     assert 1e4 * at[[Z.L, Z.R]] ** 3 == pytest.approx(5.0, rel=0.1)
+
+
+@SIDES
+@pytest.mark.parametrize(("excess", "slips"), [(0.2, False), (0.8, True)])
+def test_the_peak_of_a_push_is_as_certain_as_weaker_impacts_tell(side: Body, excess: float, slips: bool) -> None:
+    """Both arms leave, and one of them is pushed back: what the other adds has its peak while both impacts die out.
+
+    `excess` is that of the peak in roundings at the begin, of 10 N each. At the peak they have 6 N, and at the end of
+    the step 3 N.
+    """
+    def leaving(coulomb: float) -> Bench:
+        return bench(side, 0.01, -0.8, Pair.CONTACT, beside=(0.01, -0.81), beside_mode=Pair.CONTACT, beside_push=-2.5,
+                     p=0.0, coulomb=coulomb, slide=Slide.STUCK)
+
+    b = leaving(0.0)
+    tables, n, h = step(b)
+    peak = -minimize_scalar(lambda s: -abs(push_at(tables, b.plant, b.state, n, s)), bounds=(0.0, h), method="bounded",
+                            options={"xatol": 1e-9}).fun
+    assert abs(push_at(tables, b.plant, b.state, n, h)) < 0.9 * peak
+    time, what, at = first_event(leaving(peak - excess * FRICTION * (peak + 10.0)))
+    assert (time < math.inf) is slips
+    if slips:
+        assert what is forward(side, Slide.RIGHTWARD)
+        assert abs(at[Z.L] ** 3 - at[Z.R] ** 3) * 1e4 == pytest.approx(peak, abs=FRICTION * 10.0)
