@@ -15,6 +15,7 @@ from grasp_ros.exact.automaton.friction import (
     noise_at,
     slide_in_contact,
     slide_in_flight,
+    slip_candidate,
     stays_stuck,
 )
 from grasp_ros.exact.compilation.jit import COMPILED
@@ -298,3 +299,12 @@ def test_the_peak_of_a_push_is_as_certain_as_weaker_impacts_tell(side: Body, exc
     if slips:
         assert what is forward(side, Slide.RIGHTWARD)
         assert abs(at[Z.L] ** 3 - at[Z.R] ** 3) * 1e4 == pytest.approx(peak, abs=FRICTION * 10.0)
+
+
+@pytest.mark.parametrize("push", [6.0, -6.0])
+def test_a_search_that_fails_is_no_slip_to_the_other_side(push: float) -> None:
+    """6 N against 5 N slips at once to its own side; a search that gives up, here at a nan, ends the run."""
+    b = bench(LEFT, -1.0, 0.0, coulomb=5.0, slide=Slide.STUCK)
+    tables = new_workspace(ORDER).tables
+    tables.row[:3] = push, 0.0, math.nan
+    assert math.isnan(slip_candidate(tables, b.plant, 2, 1.0, (0.0, 0.0), np.zeros(len(Work), dtype=np.int64)).when)
