@@ -31,12 +31,9 @@ def lift_friction(plant: Plant) -> None:
 @kernel
 def apply_friction(plant: Plant, mode: Integers) -> None:
     """Put the mode of the object into its row of the bodies."""
-    slide, row = mode[OBJECT], plant.bodies[OBJECT]
-    given = plant.given[OBJECT]
-    if slide == Slide.FREE:
-        return
+    slide, row, given = mode[OBJECT], plant.bodies[OBJECT], plant.given[OBJECT]
     row[Of.MASS] = math.inf if slide == Slide.STUCK else given[Of.MASS]
-    against = -plant.coulomb if slide == Slide.RIGHTWARD else plant.coulomb
+    against = -plant.coulomb if slide == Slide.RIGHTWARD else plant.coulomb  # of a FREE object: 0
     row[Of.FORCE] = 0.0 if slide == Slide.STUCK else given[Of.FORCE] + against
 
 
@@ -81,7 +78,7 @@ def slide_in_flight(plant: Plant, state: State) -> Candidate:
     """When a sliding object stops in flight: v' = a - c v is solved exactly."""
     slide, v = state.mode[OBJECT], state.y[V.O]
     none = Candidate(math.inf, Slide.STUCK)
-    if slide == Slide.FREE or slide == Slide.STUCK:
+    if slide == Slide.FREE:
         return none
     body = plant.bodies[OBJECT]
     a, c = body[Of.FORCE] / body[Of.MASS], body[Of.DAMPING] / body[Of.MASS]
@@ -197,9 +194,9 @@ def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, noise: tuple[
         against[k] = -row[k]
     row[0], against[0] = push - plant.coulomb, -push - plant.coulomb
     to_right, to_left = overcome(row, n, h, noise, work), overcome(against, n, h, noise, work)
-    if math.isnan(to_right) or math.isnan(to_left):
-        return Candidate(math.nan, Slide.STUCK)
-    return Candidate(to_right, Slide.RIGHTWARD) if to_right <= to_left else Candidate(to_left, Slide.LEFTWARD)
+    if to_right <= to_left or math.isnan(to_right):  # each of them may be nan: not found
+        return Candidate(to_right, Slide.RIGHTWARD)
+    return Candidate(to_left, Slide.LEFTWARD)
 
 
 @kernel
@@ -208,7 +205,7 @@ def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: floa
 
     Afterwards `tables.at` may hold the state at another s than h. An object that has just slipped is still at rest: if
     its acceleration is below half of its rounding it counts as 0, so that the next order decides. The rounding of the
-    force is computed at 0 and at h, because it may be far smaller at h.
+    force is computed at 0 and at h, because it may be far smaller at h: then a slip that it hides at 0 is certain at h.
     """
     slide, row, c = state.mode[OBJECT], tables.row, tables.c
     if slide != Slide.STUCK:
@@ -238,7 +235,7 @@ def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: floa
             return found
         impact_series(tables, plant, state.mode, n)  # near the friction, not for certain above it
     found = slip_candidate(tables, plant, n, h, (noise, later), work)
-    if -noise <= begin <= noise and (found.when <= h or end > later):
+    if end > later:
         impact_series(tables, plant, state.mode, n)
         return since_certain(tables, plant, state.mode, n, min(found.when, h))
     return found
