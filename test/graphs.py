@@ -18,8 +18,8 @@ from grasp_ros.graph import bag
 from grasp_ros.graph.bag.recorder import Recorder
 from grasp_ros.graph.bag.recording import Recording
 from grasp_ros.graph.bag.verify import verify
+from grasp_ros.graph.parameters import Running
 from grasp_ros.graph.processes import Graph
-from grasp_ros.graph.running import Running
 from grasp_ros.scene import Scene
 from lab.drills.recorder import Tick
 

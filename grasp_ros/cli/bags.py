@@ -65,7 +65,7 @@ def keeps(recording: Recording, options: argparse.Namespace) -> bool:
 
 
 def _recover(options: argparse.Namespace) -> int:
-    from grasp_ros.graph.bag.recover import recover
+    from grasp_ros.graph.bag.reading import recover
 
     bag = options.bag if options.bag.name else options.bag.resolve()  # "." has no name
     new = options.output or bag.parent / f"{bag.name if os.path.isdir(bag) else bag.stem}_recovered"

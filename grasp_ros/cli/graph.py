@@ -22,9 +22,8 @@ from grasp_ros.cli.output import has_notes
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
 from grasp_ros.graph.bag import BagError, EmptyBagError
 from grasp_ros.graph.host import check_reach, hold, network
-from grasp_ros.graph.parameters import PEER_SECONDS
+from grasp_ros.graph.parameters import PEER_SECONDS, Running, check_factor
 from grasp_ros.graph.processes import Graph, become
-from grasp_ros.graph.running import Running, check_factor
 from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals, on_signals
 from grasp_ros.physics.errors import Failed, Refused, need
 from grasp_ros.scene.topics import JOINT_STATES

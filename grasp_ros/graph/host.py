@@ -115,28 +115,18 @@ def check_reach(given: Mapping[str, str], alone: bool = False) -> None:
     if reach not in RANGES and not (alone and reach == OFF):
         why = ", no node would find another" if reach == OFF else ""
         raise Refused(f"{RANGE}: {reach!r} is not allowed{why}; allowed: {', '.join(RANGES[1:])}")
-    if middleware and middleware not in (installed := _installed(given)):  # ROS's library would end the process
-        raise Refused(f"{MIDDLEWARE}: {middleware!r} is not allowed; allowed here: {', '.join(installed)}")
-    for name in PROFILE_FILES:
-        if given.get(name):
-            _check_profile(name, given[name])
-
-
-def _check_profile(name: str, file: str) -> None:
-    """Refuse a file that Fast DDS would pass over without a word, and listen to every interface."""
-    from xml.etree import ElementTree  # most have no such file
-
-    try:
-        ElementTree.parse(file)
-    except (OSError, ElementTree.ParseError) as error:
-        raise Refused(f"{name}: {file!r} is not allowed: {error}; allowed: an XML file of profiles") from None
-
-
-def _installed(given: Mapping[str, str]) -> list[str]:
-    """Names of the middlewares of this installation."""
     roots = [sys.prefix, *filter(None, given.get("AMENT_PREFIX_PATH", "").split(os.pathsep))]
-    names = (file.name for root in roots for file in Path(root, INDEX).glob("rmw_*"))
-    return sorted({OURS, *names} - {"rmw_implementation"})
+    installed = {OURS, *(file.name for root in roots for file in Path(root, INDEX).glob("rmw_*"))}
+    installed.discard("rmw_implementation")
+    if middleware and middleware not in installed:  # ROS's library would end the process
+        raise Refused(f"{MIDDLEWARE}: {middleware!r} is not allowed; allowed here: {', '.join(sorted(installed))}")
+    for name, file in ((name, given[name]) for name in PROFILE_FILES if given.get(name)):
+        from xml.etree import ElementTree  # most have no such file
+
+        try:  # Fast DDS would pass over it without a word, and listen to every interface
+            ElementTree.parse(file)
+        except (OSError, ElementTree.ParseError) as error:
+            raise Refused(f"{name}: {file!r} is not allowed: {error}; allowed: an XML file of profiles") from None
 
 
 def remove_left() -> None:

@@ -1,11 +1,14 @@
-"""What can be set at the start of a node with `-p NAME:=VALUE`: defaults, and meanings in words."""
+"""What can be set at the start of a node with `-p NAME:=VALUE`, and how a plant then runs: in lockstep or not."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
-from grasp_ros.physics.accuracy import ACCURACY
+from grasp_ros.physics.accuracy import ACCURACY, check_accuracy
 from grasp_ros.physics.errors import Refused
 
 PEER_SECONDS, START_SECONDS = 1.5, 60.0  # without a heartbeat of a node, and until it comes
@@ -47,6 +50,8 @@ TOOLS: dict[str, Settings] = {  # which commands of `grasp` become
     "watch": {},
 }
 PARAMETERS = NODES | TOOLS
+REACTIONS = ("hold", "zero", "stop")
+LEAST = 1e-6  # real-time factor
 
 
 def usage(node: str) -> str:
@@ -75,3 +80,69 @@ def check_timeouts(peer: float, start: float) -> None:
     if not 0.0 < peer <= start:
         most = f", at most {start:g} like start_timeout_s" if start < math.inf else ""
         raise Refused(f"peer_timeout_s: {peer:g} is not allowed; allowed: a number > 0{most}")
+
+
+def check_factor(factor: float, name: str = "real_time_factor") -> None:
+    """Refuse what no free run, and no replay, can have as its simulated seconds per second."""
+    if not LEAST <= factor <= 1.0 / LEAST:
+        raise Refused(f"{name}: {factor!r} is not allowed; allowed: {LEAST:g} to {1.0 / LEAST:g}")
+
+
+@dataclass(frozen=True)
+class Running:
+    """How a plant runs."""
+
+    accuracy: float = ACCURACY  # of its integrator
+    real_time_factor: float = 0.0  # simulated seconds per second of wall time; 0: lockstep
+    # By side, in a free run: simulated time in s without a command, and what then acts: "hold" the last command, "zero"
+    # force, or "stop" the run.
+    timeouts: Mapping[str, float] = field(default_factory=dict)
+    reactions: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_accuracy(self.accuracy)
+        for side, seconds in self.timeouts.items():
+            if not 0.0 < seconds < math.inf:
+                raise Refused(f"{side}_timeout_s: {seconds!r} is not allowed; allowed: a number > 0")
+        if self.real_time_factor:
+            check_factor(self.real_time_factor)
+        for side, reaction in self.reactions.items():
+            if reaction not in REACTIONS:
+                raise Refused(f"{side}_on_timeout: {reaction!r} is not allowed; allowed: {', '.join(REACTIONS)}")
+        if self.timeouts.keys() != self.reactions.keys():
+            raise Refused("timeouts, reactions: different sides; allowed: the same sides in both")
+
+    @property
+    def lockstep(self) -> bool:
+        """Whether each state waits for its commands."""
+        return not self.real_time_factor
+
+    @property
+    def words(self) -> str:
+        """For a reader."""
+        if self.lockstep:
+            return "lockstep"
+        silence = {side: f"{self.reactions[side]} after {seconds:g} s" for side, seconds in self.timeouts.items()}
+        alike = sorted({*silence.values()})
+        words = alike if len(alike) == 1 else [f"{side} {reaction}" for side, reaction in silence.items()]
+        without = f"; on timeout: {', '.join(words)}" if words else ""
+        return f"free-running, {self.real_time_factor:g} s per second{without}"
+
+    def to_yaml(self) -> str:
+        """As YAML; `parse` of it gives the same."""
+        from grasp_ros.scene import strict_yaml  # with NumPy, for which the entry of a node does not wait
+
+        mode = "lockstep" if self.lockstep else "free-running"
+        return strict_yaml.dump({"mode": mode, **asdict(self)})
+
+    @classmethod
+    def parse(cls, text: str) -> Running:
+        """Read what `to_yaml` wrote."""
+        from grasp_ros.scene import strict_yaml
+
+        try:
+            found: dict[str, Any] = strict_yaml.load(text)
+            found.pop("mode")
+            return cls(**found)
+        except (Refused, AttributeError, KeyError, TypeError) as error:
+            raise Refused(f"run: not a description of a run by a plant: {' '.join(str(error).split())}") from None

@@ -101,7 +101,7 @@ class Graph:
         for name in self.laws.keys() & {*self.without}:
             raise Refused(f"{name}: --controller and --without; allowed: one of the two")
         scene_file = self.directory / f"{self.scene.name}.yaml"
-        commands = self._commands(self._settings(scene_file))
+        commands = self._commands(scene_file)
         self._hold = hold(os.environ, self.namespace)
         try:
             with new_directory(self.directory):
@@ -126,30 +126,28 @@ class Graph:
             end.close()
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
-    def _settings(self, scene: Path) -> dict[str, Values]:
-        """Parameters of the nodes, where the file of the scene will be; a law may leave the working directory."""
+    def _commands(self, scene: Path) -> dict[str, list[str]]:
+        """Command lines by the names of the processes, with a scene's file; a law may leave the working directory."""
         patience = 0.0 if self.without else START_SECONDS
         check_timeouts(self.peer_timeout, patience or math.inf)
         shared: Values = {
             "on_silence": self.on_silence, "peer_timeout_s": self.peer_timeout, "start_timeout_s": patience
         }
         monitored = {**shared, "wait_for_monitor": True}
-        return {
+        settings: dict[str, Values] = {
             "monitor": {**shared, "bag": str(self.bag.absolute())},
             **{name: {**monitored, "law": self.laws.get(name, "")}
                for name in self.scene.controllers if name not in self.without},
             "plant": {**monitored, "scene": str(scene.absolute()), "accuracy": float(self.accuracy), **self.plant},
         }
-
-    def _commands(self, settings: Mapping[str, Values]) -> dict[str, list[str]]:
-        """Command lines by the names of the processes."""
-        nodes = {name: ((name,), numbers) for name, numbers in settings.items()}
+        nodes = {name: [name] for name in settings}
         if self.one_process:
-            together = {f"{name}:{key}": value for name, numbers in settings.items() for key, value in numbers.items()}
-            nodes = {"graph": (("graph", *settings), together)}
+            nodes = {"graph": ["graph", *settings]}
+            settings = {"graph": {f"{name}:{key}": number for name, own in settings.items()
+                                  for key, number in own.items()}}
         level = ["--log-level", "error"] if self.quiet else []
-        return {name: [*_command(["child", *own], numbers, self.namespace), *level]
-                for name, (own, numbers) in nodes.items()}
+        return {name: [*_command(["child", *own], settings[name], self.namespace), *level]
+                for name, own in nodes.items()}
 
     def wait(self, received: Sequence[int]) -> None:
         """Wait until plant and monitor have finished, or until a signal has been received.

@@ -21,7 +21,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from grasp_ros.graph.running import check_factor
+from grasp_ros.graph.parameters import check_factor
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -71,8 +71,10 @@ class View:
         width = min(max(width, LEAST), WIDEST)
         self._reach = max(self._reach, float(np.nanmax(np.abs(moment.state[0::2]))))
         hint = [Text(self.hint, style="dim")] if self.hint else []
+        gap, left, right = (width - 9) // 2, f"{-self._reach:.3g} m", f"{self._reach:.3g} m"
+        ruler = Text(f"{left:<{gap}}0{right:>{width - gap - 9}}", style="dim")
         parts = Group(
-            self._line(moment.state, width - 8), self._ruler(width - 8), "", self._bodies(moment, width < NARROW), "",
+            self._line(moment.state, width - 8), ruler, "", self._bodies(moment, width < NARROW), "",
             *self._energy(moment.level, width), *hint,
         )
         below = f"t = {moment.time:.3f} s   {moment.words}"
@@ -91,11 +93,6 @@ class View:
             row = Text.assemble(row[:begin], (sign, style), row[begin + 3 :])
             taken = begin + 2
         return row
-
-    def _ruler(self, track: int) -> Text:
-        left, right = f"{-self._reach:.3g} m", f"{self._reach:.3g} m"
-        gap = (track - 1) // 2
-        return Text(f"{left:<{gap}}0{right:>{track - gap - 1}}", style="dim")
 
     def _bodies(self, moment: Moment, narrow: bool) -> Table:
         table = Table(box=None, padding=(0, 1 if narrow else 2), collapse_padding=narrow, pad_edge=not narrow)

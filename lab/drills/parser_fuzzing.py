@@ -21,7 +21,7 @@ from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.accuracy.measure import Record
 from grasp_ros.graph import bag
-from grasp_ros.graph.bag.recover import recover
+from grasp_ros.graph.bag.reading import recover
 from grasp_ros.graph.bag.storage import unpack
 from grasp_ros.physics.errors import LONGEST, Refused
 from grasp_ros.simulation import Trajectory, simulate

@@ -15,8 +15,8 @@ import numpy as np
 from tqdm import tqdm
 
 from grasp_ros.graph import bag
+from grasp_ros.graph.bag.reading import recover
 from grasp_ros.graph.bag.recorder import FLUSH_SECONDS, Recorder
-from grasp_ros.graph.bag.recover import recover
 from grasp_ros.graph.serialization import force_message, list_message
 from grasp_ros.physics.energy import energy, energy_balance
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT

@@ -28,12 +28,11 @@ from sensor_msgs.msg import JointState
 from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.verify import verify
-from grasp_ros.graph.health import watchdog
-from grasp_ros.graph.health.peers import PeerNode
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.nodes.monitor import Monitor
 from grasp_ros.graph.nodes.plant import Plant
-from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros import heartbeat, messages
+from grasp_ros.graph.ros.peers import PeerNode
 from grasp_ros.graph.serialization import force_message
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, WINDOW
 from lab.drills.nodes import plain_messages
@@ -82,9 +81,10 @@ def test_a_silent_controller_has_the_declared_reaction(launch: Any, reaction: st
 
 def test_who_has_sent_a_first_command_is_not_waited_for(make: Any) -> None:
     plant = make(Plant, scene="case_01", free_running=True, wait_for_controllers=True, wait_for_monitor=False)
-    left, right = plant.scene.controllers.values()
-    plant.loop._on_command("left", left, force_message(0, 1.0))
-    assert [(need.topic, need.due) for need in plant.needs()] == [(left, math.inf), (right, plant.published_at)]
+    left, right = plant.loop._commands
+    plant.loop._on_command(left, force_message(0, 1.0))
+    assert [(need.topic, need.due) for need in plant.needs()] == [
+        (left.topic, math.inf), (right.topic, plant.published_at)]
 
 
 @pytest.mark.parametrize("monitored", [True, False])
@@ -103,8 +103,8 @@ def test_a_free_run_begins_when_its_monitor_has_heard_all_controllers(
         names = {topic.name for topic in heard}
         wait_for(lambda: executor.spin_once(timeout_sec=0.1) or names <= {  # noqa: B023
             name for beat in plant.heartbeats.alive for name in beat.hears}, "the heartbeats")
-        for side, topic in zip(("left", "right"), sides.values(), strict=True):
-            plant.loop._on_command(side, topic, force_message(0, 1.0))
+        for own in plant.loop._commands:
+            plant.loop._on_command(own, force_message(0, 1.0))
         waits = monitored and not heard
         assert plant.loop.missing() == ([topic.name for topic in sides.values()] if waits else [])
         assert any(need.due == plant.published_at for need in plant.needs()) is waits  # not for ever
@@ -118,7 +118,7 @@ def test_a_reset_waits_for_the_monitor_and_the_wait_is_no_period(make: Any) -> N
         wait_for(lambda: loop.advance() or plant.tick >= tick, f"tick {tick}")
 
     go_on(5)
-    tick, loop._steering.reset_due = plant.tick, True
+    tick, loop.reset_due = plant.tick, True
     time.sleep(0.3)
     loop.advance()
     assert (plant.tick, plant.resets) == (tick, 0)
@@ -216,7 +216,7 @@ def test_a_plant_that_is_faster_than_its_monitor_waits_for_it(launch: Any, node:
     period_ns, ticks = scene.load("arm_alone").period_ns, []
 
     def note(message: JointState) -> None:
-        ticks.append(messages.to_ns(message.header.stamp) // period_ns)
+        ticks.append(plain_messages.to_ns(message.header.stamp) // period_ns)
 
     peer.create_subscription(JointState, JOINT_STATES.name, note, messages.qos(JOINT_STATES))
     recorded = peer.create_publisher(JointState, LYAPUNOV.name, messages.qos(LYAPUNOV))
@@ -242,7 +242,7 @@ def test_a_monitor_that_waits_for_a_lost_command_is_not_blocked(
     for node in (plant, controller, monitor):
         executor.add_node(node)
     wait_for(lambda: executor.spin_once(timeout_sec=0.1) or any(monitor._acted), "a command that acted")
-    monkeypatch.setattr(watchdog.os, "_exit", ended.append)
+    monkeypatch.setattr(heartbeat.os, "_exit", ended.append)
     monkeypatch.setattr(monitor.heartbeats, "frozen", lambda: ["/left_controller"])
     monkeypatch.setattr(monitor, "take_waiting", lambda *_: None)
     for commands in monitor._commands.values():

@@ -16,11 +16,11 @@ from rosbags.typesys import Stores, get_typestore
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
-from grasp_ros.graph.bag.recover import recover
+from grasp_ros.graph.bag.reading import recover
 from grasp_ros.graph.bag.rosbag2 import text_message
 from grasp_ros.graph.bag.summary import summary
 from grasp_ros.graph.bag.verify import verify
-from grasp_ros.graph.running import Running
+from grasp_ros.graph.parameters import Running
 from grasp_ros.graph.serialization import list_message
 from grasp_ros.physics.layout import OBJECT
 from grasp_ros.physics.system import COLUMN, NAMES

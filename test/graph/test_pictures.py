@@ -24,14 +24,15 @@ from visualization_msgs.msg import Marker, MarkerArray
 from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.nodes.picture import TOUCHING, markers
+from grasp_ros.graph.nodes.watch import HINT
 from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.terminal import SIGNS, Moment, View
-from grasp_ros.graph.tools.watch import HINT
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.topics import CONTACTS, FRAME, LYAPUNOV_NAMES, ROBOT_DESCRIPTION
 from grasp_ros.simulation import simulate
+from lab.drills.nodes import plain_messages
 
 pytestmark = pytest.mark.slow  # real processes
 TRACK = 72  # columns
@@ -60,7 +61,7 @@ def test_markers_show_the_states_and_only_where_somebody_looks(tmp_path: Path, n
     states = dict(zip((recording.tick * case.period_ns).tolist(), recording.state, strict=True))
     assert len(pictures) > 3
     for picture in pictures:
-        time_ns = messages.to_ns(picture.markers[0].header.stamp)
+        time_ns = plain_messages.to_ns(picture.markers[0].header.stamp)
         sent = serialize_message(markers(case, time_ns, states[time_ns]))
         assert picture == deserialize_message(sent, MarkerArray)  # colors as they travel
     joints = ElementTree.fromstring(texts[0]).findall("joint")
@@ -100,7 +101,7 @@ from std_msgs.msg import String
 from grasp_ros import scene
 from grasp_ros.graph.ros import messages
 from lab.drills.nodes import plain_messages
-from grasp_ros.graph.running import Running
+from grasp_ros.graph.parameters import Running
 from grasp_ros.scene.topics import *
 case = scene.load("case_01")
 topics = [SCENE, RUN, *case.topics]

@@ -26,7 +26,6 @@ from grasp_ros.graph import bag
 from grasp_ros.graph.nodes.plant import Plant
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.serialization import force_message
-from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, SCENE
 from grasp_ros.simulation import simulate
 from lab.drills.nodes import plain_messages
@@ -197,7 +196,7 @@ def test_plant_drops_what_is_stale_repeated_or_not_finite(launch: Any, node: Any
 
     def answer(message: JointState) -> None:
         states.append(np.column_stack([message.position, message.velocity]).ravel())
-        now = messages.to_ns(message.header.stamp)
+        now = plain_messages.to_ns(message.header.stamp)
         forces = commands(expected.scene.system, now // 1_000_000, states[-1])
         for publisher in publishers:
             publisher.publish(plain_messages.wrench(now - 1_000_000, 100.0))
@@ -221,29 +220,29 @@ def test_who_answers_a_state_that_was_published_again_is_not_blamed(
 ) -> None:
     """It was published again for somebody else."""
     plant = make(Plant, scene="case_01", wait_for_monitor=False)
-    plant.begun, loop, (left, right) = True, plant.loop, plant.scene.controllers.values()
+    plant.begun, loop, (left, right) = True, plant.loop, plant.loop._commands
     first, second = (force_message(tick * plant.scene.period_ns, 0.0) for tick in (0, 1))
-    loop._on_command(LEFT, left, first)
+    loop._on_command(left, first)
     loop._repeat(1.0)
-    loop._on_command(LEFT, left, first)
-    loop._on_command(RIGHT, right, first)
-    loop._on_command(RIGHT, right, first)
+    loop._on_command(left, first)
+    loop._on_command(right, first)
+    loop._on_command(right, first)
     assert plant.tick == plant.counters["repeated commands"] == plant.counters["stale commands"] == 1
     assert "commands" not in capfd.readouterr().err
     for _ in range(2):
-        loop._on_command(LEFT, left, second)
+        loop._on_command(left, second)
     assert "left/effort_command: repeated commands: 2; sources seen: " in capfd.readouterr().err
 
 
 def test_who_answers_only_when_asked_again_is_named(make: Any, capfd: pytest.CaptureFixture[str]) -> None:
     """One that answers a state when the next one comes, say: the graph would crawl without a word."""
     plant = make(Plant, scene="case_01", wait_for_monitor=False)
-    plant.begun, loop, (left, right) = True, plant.loop, plant.scene.controllers.values()
+    plant.begun, loop, (left, right) = True, plant.loop, plant.loop._commands
     for tick in range(2):
         assert "late answers" not in capfd.readouterr().err
         plant.published_at = 0.0
-        loop._on_command(LEFT, left, force_message(tick * plant.scene.period_ns, 0.0))
+        loop._on_command(left, force_message(tick * plant.scene.period_ns, 0.0))
         loop.ask_again(10.0 * (tick + 1))
-        loop._on_command(RIGHT, right, force_message(tick * plant.scene.period_ns, 0.0))
+        loop._on_command(right, force_message(tick * plant.scene.period_ns, 0.0))
     assert (plant.tick, plant.counters["repeated states"], plant.counters["late answers"]) == (2, 2, 1)
     assert "right/effort_command: late answers: 1; sources seen: " in capfd.readouterr().err

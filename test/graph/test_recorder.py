@@ -30,9 +30,8 @@ from rosbags.typesys import Stores, get_typestore
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.opening import Opened
-from grasp_ros.graph.bag.reading import BagReader
+from grasp_ros.graph.bag.reading import recover
 from grasp_ros.graph.bag.recorder import HEAD, NOT_RECORDED, RESERVE_BYTES, Recorder
-from grasp_ros.graph.bag.recover import recover
 from grasp_ros.graph.bag.rosbag2 import INFORMATION
 from grasp_ros.graph.bag.storage import DATA_END_BYTES, SUM
 from grasp_ros.graph.processes import Graph
@@ -229,7 +228,7 @@ def test_stamps_are_whole_numbers_after_104_days(tmp_path: Path) -> None:
     """2^53 ns, from where on floating-point numbers have not every one."""
     scene = scenes.load("arm_alone", ["time.control_period_s=999.000000001", "time.duration_s=9990000.00001"])
     written(tmp_path / "bag", scene, [])
-    reader, template = BagReader(Opened(tmp_path / "bag")), template_of(JOINT_STATES, ["left"])
+    reader, template = Opened(tmp_path / "bag"), template_of(JOINT_STATES, ["left"])
     for time_ns in [tick * scene.period_ns for tick in range(9010, 9020)]:
         reader.row(time_ns, {JOINT_STATES: template.fill(time_ns, (0.1, 0.0, 0.0))})
         assert reader.stamp_ns == time_ns

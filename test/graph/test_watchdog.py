@@ -6,9 +6,8 @@ from typing import Any
 
 import pytest
 
-from grasp_ros.graph.health import watchdog
-from grasp_ros.graph.health.heartbeat import HEARTBEAT_SECONDS
-from grasp_ros.graph.health.watchdog import EVERY_SECONDS, Watchdog
+from grasp_ros.graph.ros import heartbeat
+from grasp_ros.graph.ros.heartbeat import EVERY_SECONDS, HEARTBEAT_SECONDS, Watchdog
 
 PATIENCE, LAW_PATIENCE = 2.1, 60.0
 
@@ -18,8 +17,8 @@ class Clock:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, ends: bool) -> None:
         self.now, self.frozen, self.ended = 100.0, ["/plant"], list[int]()
-        monkeypatch.setattr(watchdog.time, "monotonic", lambda: self.now)
-        monkeypatch.setattr(watchdog.os, "_exit", self.ended.append)
+        monkeypatch.setattr(heartbeat.time, "monotonic", lambda: self.now)
+        monkeypatch.setattr(heartbeat.os, "_exit", self.ended.append)
         self.most: float | None = LAW_PATIENCE
         self.dog = Watchdog("monitor", PATIENCE, lambda: self.most, ends, lambda: self.frozen)
 
@@ -63,7 +62,7 @@ def test_a_law_that_does_not_return_has_longer(monkeypatch: Any, capsys: Any) ->
     assert not clock.ended
     clock.beat(2)
     assert clock.ended
-    assert f" s: in {watchdog.__file__}, line " in capsys.readouterr().err  # where the thread of the nodes is
+    assert f" s: in {heartbeat.__file__}, line " in capsys.readouterr().err  # where the thread of the nodes is
     clock.most = None
     clock.dog.feed()
     clock.ended.clear()

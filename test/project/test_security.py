@@ -21,12 +21,11 @@ from processes import DEADLINE, START, wait_for
 
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
-from grasp_ros.graph import bag, host, running
+from grasp_ros.graph import bag, host
 from grasp_ros.graph.bag.opening import Opened
+from grasp_ros.graph.bag.reading import recover
 from grasp_ros.graph.bag.recorder import Recorder
-from grasp_ros.graph.bag.recover import recover
-from grasp_ros.graph.parameters import PEER_SECONDS
-from grasp_ros.graph.running import Running
+from grasp_ros.graph.parameters import PEER_SECONDS, Running
 from grasp_ros.maps import store
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.npz import signed
@@ -81,7 +80,7 @@ def test_a_tag_in_a_text_is_not_followed(tmp_path: Path, tag: str) -> None:
         (tmp_path / "a.yaml").write_text(text)
         doors: list[Callable[[], object]] = [
             lambda: scenes.load(str(tmp_path / "a.yaml")), lambda text=text: scenes.parse(text, "scene", "topic scene"),
-            lambda text=text: running.parse(text),
+            lambda text=text: Running.parse(text),
         ]
         for door in doors:
             with pytest.raises(Refused):
@@ -97,7 +96,7 @@ def test_a_tag_in_a_text_is_not_followed(tmp_path: Path, tag: str) -> None:
 )
 def test_a_text_on_run_that_no_plant_says_is_refused(text: str) -> None:
     with pytest.raises(Refused, match=r"^(run: not a description of a run by a plant|accuracy)"):
-        running.parse(text)
+        Running.parse(text)
 
 
 @pytest.mark.parametrize("tag", TAGS[:2])

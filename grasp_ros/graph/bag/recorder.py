@@ -25,7 +25,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from grasp_ros.graph.bag import BagError, rosbag2
 from grasp_ros.graph.bag.disk import CHUNK_BYTES, RESERVE_BYTES, Sink
-from grasp_ros.graph.running import Running
+from grasp_ros.graph.parameters import Running
 from grasp_ros.graph.serialization import template_of
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -220,21 +220,17 @@ class Recorder:
                 with writing(self._path, BagError):
                     with self._lock:
                         self._flush()
-                    self._check_file()
+                    self._sink.check()
+                    file, there = os.fstat(self._sink.file), self._path / f"{self._path.name}.mcap"
+                    if not file.st_nlink:  # its end could not be written behind it
+                        raise BagError(f"{self._path}: was deleted during the recording")
+                    if not there.exists() or not os.path.samestat(file, there.stat()):
+                        raise BagError(f"{self._path}: was moved during the recording, which ends there;"
+                                       " `grasp recover` closes it")
                     os.fdatasync(self._sink.file)
             except BagError as error:  # for whoever writes or closes next
                 self._error, self._closed = str(error), True
                 return
-
-    def _check_file(self) -> None:
-        """Refuse a file that was deleted, moved or cut off: its end could not be written behind it."""
-        self._sink.check()
-        file = os.fstat(self._sink.file)
-        if not file.st_nlink:
-            raise BagError(f"{self._path}: was deleted during the recording")
-        there = self._path / f"{self._path.name}.mcap"
-        if not there.exists() or not os.path.samestat(file, there.stat()):
-            raise BagError(f"{self._path}: was moved during the recording, which ends there; `grasp recover` closes it")
 
     @property
     def gaps(self) -> str:

@@ -13,11 +13,10 @@ import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph.bag.recorder import NOT_RECORDED, WRITTEN
-from grasp_ros.graph.running import Running
+from grasp_ros.graph.parameters import Running
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
-from grasp_ros.physics.given import instance
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
@@ -252,7 +251,8 @@ class Recording(Motion, Frozen):
         if not self.closed:
             return energy(self.scene.system, self.state, external, feedback=False)
         if self.unheard:  # of numbers that nobody knows: what the monitor says stands
-            return Energy(*self.lyapunov[:, :3].T, energy(self.scene.system, self.state, external).mode)
+            V, V_c, V_rate = self.lyapunov[:, :3].T
+            return Energy(V, V_c, V_rate, energy(self.scene.system, self.state, external).mode)
         parts = [energy(scene.system, self.state[rows], external[rows]) for scene, rows in self.parts]
         return Energy(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
@@ -283,11 +283,6 @@ class Recording(Motion, Frozen):
                   WRITTEN: max(int(self.lost.get(WRITTEN, there)) - there, 0)}
         return {**{name: ticks - self.counts[name] for name in every_tick}, **self.unheard,
                 **{name: number for name, number in others.items() if number}}
-
-
-def check_recording(recording: object) -> Recording:
-    """Refuse what is no recording."""
-    return instance("recording", recording, Recording, "a Recording")  # type: ignore[no-any-return]
 
 
 def acted_from(ticks: np.ndarray, effort: Array) -> Array:

@@ -77,7 +77,8 @@ class Storage:
         if data[: len(MAGIC)] != MAGIC:
             raise BagError(f"{self.path}: not a bag of this package: no MCAP file")
         if self.closed:
-            (self._read_summary if self._salvage else self._check_sums)()
+            footer = Footer.read(ReadDataStream(BytesIO(data[HEAD.size - FOOTER_BYTES : -len(MAGIC)])))
+            (self._read_summary if self._salvage else self._check_sums)(footer)
         offset = len(MAGIC)
         while offset < len(data):
             try:
@@ -155,20 +156,15 @@ class Storage:
             self._channels[channel.id] = channel
         return opcode in (Opcode.SCHEMA, Opcode.CHANNEL)
 
-    def _read_summary(self) -> None:
+    def _read_summary(self, footer: Footer) -> None:
         """Take schemas and channels from an index, which repeats them: their chunk, the first, may be damaged."""
         with suppress(*DAMAGE):
-            footer = self._footer()
             offset = footer.summary_start
             summary = memoryview(self._data)[offset : -len(MAGIC) - SUM.size]
             if not offset or (footer.summary_crc and zlib.crc32(summary) != footer.summary_crc):
                 return
             for opcode, body, _ in records(self._data, offset):
                 self._defines(opcode, body)
-
-    def _footer(self) -> Footer:
-        footer: Footer = Footer.read(ReadDataStream(BytesIO(self._data[HEAD.size - FOOTER_BYTES : -len(MAGIC)])))
-        return footer
 
     def _behind_damage(self, offset: int, why: str) -> int:
         """Where to go on; the end of the file if nothing follows, which is what a recorder leaves that was killed."""
@@ -191,10 +187,9 @@ class Storage:
             offset += 1
         return None
 
-    def _check_sums(self) -> None:
+    def _check_sums(self, footer: Footer) -> None:
         """Refuse a closed file of which a byte is wrong."""
         data = memoryview(self._data)
-        footer = self._footer()
         end = footer.summary_start or len(data) - FOOTER_BYTES  # without an index
         if not DATA_END_BYTES <= end <= len(data):
             self._refuse("its end does not say where its index is")

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.graph.bag.recorder import LEFT_OUT, SOURCE
-from grasp_ros.graph.bag.recording import Recording, check_recording
-from grasp_ros.graph.bag.verify import Verification
+from grasp_ros.graph.bag.recording import Recording
+from grasp_ros.graph.bag.verify import Verification, check_recording
 from grasp_ros.physics.model import Mode
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
 

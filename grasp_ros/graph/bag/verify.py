@@ -15,9 +15,10 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.graph.bag.recorder import WRITTEN
-from grasp_ros.graph.bag.recording import Recording, check_recording
+from grasp_ros.graph.bag.recording import Recording
 from grasp_ros.physics.control import is_due
 from grasp_ros.physics.energy import energy, energy_balance
+from grasp_ros.physics.given import instance
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Contact, impact_force, penetration
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -66,6 +67,11 @@ class Verification(NamedTuple):
             return f"nothing from the recorded inputs: {self.problem}"
         equal = f"{self.ticks} states follow from the recorded inputs, bit for bit"
         return f"{equal}; {self.problem}" if self.problem else equal
+
+
+def check_recording(recording: object) -> Recording:
+    """Refuse what is no recording."""
+    return instance("recording", recording, Recording, "a Recording")  # type: ignore[no-any-return]
 
 
 def verify(recording: Recording) -> Verification:

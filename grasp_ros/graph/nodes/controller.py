@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 
 from grasp_ros import scene as scenes
-from grasp_ros.graph import running as runnings
-from grasp_ros.graph.health.peers import Need, PeerNode
+from grasp_ros.graph.parameters import Running
 from grasp_ros.graph.ros.messages import UNREADABLE, State, StateReader
 from grasp_ros.graph.ros.node import Phase
+from grasp_ros.graph.ros.peers import PeerNode
 from grasp_ros.graph.serialization import list_message, template_of
 from grasp_ros.physics.control import FIXED, Column, command_of, limited
-from grasp_ros.physics.errors import Refused, described
+from grasp_ros.physics.errors import Failed, Refused, described
 from grasp_ros.physics.observation import Observation, check, observables_of
 from grasp_ros.physics.system import COLUMN, NAMES, System
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
@@ -67,10 +67,6 @@ class Controller(PeerNode):
         self.on_text(SCENE, self._on_scene)
         self.when(self._ready, self._start)
 
-    def needs(self) -> Iterator[Need]:
-        """The plant; a monitor is the plant's need."""
-        yield Need(JOINT_STATES)
-
     def blocking_limit(self) -> float | None:
         """An import that does not return, or asks at a terminal, has as long as a node that does not come."""
         return self.start_patience if self._is_loading else super().blocking_limit()
@@ -80,7 +76,7 @@ class Controller(PeerNode):
         return self._answered, self._scene
 
     def _on_run(self, text: str) -> None:
-        self._free = not runnings.parse(text).lockstep
+        self._free = not Running.parse(text).lockstep
 
     def _on_scene(self, text: str) -> None:
         """A plant has come: the first one, or one after another."""
@@ -198,22 +194,14 @@ class Controller(PeerNode):
         tick, side, system = time_ns // self._scene.period_ns, SIDES[self._side], self._scene.system
         before, self._answered = self._answered // self._scene.period_ns, time_ns
         every = int(system.laws[side].row[Column.PERIOD])
-        if 0 <= before < tick and before // every == tick // every:  # a free run may pass the tick that is answered
-            self._answer(time_ns)
-            self.count("answered states")
-            return
-        try:
+        if not 0 <= before < tick or before // every != tick // every:  # a free run may pass the tick that is answered
             if self._own:
                 force = self._own.command(system, side, tick, self._scene.time_of(tick), state.numbers)
             else:
                 force = system.laws[side].command(tick, *state.numbers[COLUMN[side] :][:2])
-        except Refused as error:
-            self.fail(str(error))
-            return
-        if not math.isfinite(force):  # the plant would not take it, and all would wait
-            self.fail(f"the command is no longer finite, t = {time_ns / NANOSECONDS} s")
-            return
-        self._force = force
+            if not math.isfinite(force):  # the plant would not take it, and all would wait
+                raise Failed(f"the command is no longer finite, t = {time_ns / NANOSECONDS} s")
+            self._force = force
         self._answer(time_ns)
         self.count("answered states")
 

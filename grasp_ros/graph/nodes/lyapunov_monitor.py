@@ -9,9 +9,8 @@ import numpy as np
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
-from grasp_ros.graph.lockstep.synchronizer import Tick
-from grasp_ros.graph.ros.messages import to_ns
-from grasp_ros.graph.serialization import raw_force
+from grasp_ros.graph.nodes.synchronizer import Tick
+from grasp_ros.graph.serialization import raw_force, raw_stamp_ns
 from grasp_ros.physics.control import is_due
 from grasp_ros.physics.energy import energy, energy_balance
 from grasp_ros.physics.errors import Refused
@@ -53,7 +52,7 @@ class LyapunovMonitor:
         self.lost += self._numbers[side].take(message)
         if len(message.name) != len(message.position):
             raise Refused(f"{side}/parameters: {len(message.name)} names, {len(message.position)} numbers")
-        stamp, numbers = to_ns(message.header.stamp), dict(zip(message.name, message.position, strict=True))
+        stamp, numbers = raw_stamp_ns(cdr), dict(zip(message.name, message.position, strict=True))
         wanted = set(self._scene.numbers_of(f"{side}_controller"))
         if set(numbers) != wanted:
             raise Refused(f"{side}/parameters: {', '.join(numbers) or 'nothing'}; allowed: exactly"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter, deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from datetime import datetime
 from functools import partial
@@ -14,17 +14,17 @@ from typing import Any
 from rclpy.subscription import Subscription
 
 from grasp_ros import scene as scenes
-from grasp_ros.graph import running as runnings
 from grasp_ros.graph.bag import BagError
 from grasp_ros.graph.bag.recorder import NOT_RECORDED, Recorder, check_path
 from grasp_ros.graph.bag.rosbag2 import topics_of
-from grasp_ros.graph.health.heartbeat import digest
-from grasp_ros.graph.health.peers import Need, PeerNode
-from grasp_ros.graph.lockstep.admission import Limits, Sources
-from grasp_ros.graph.lockstep.synchronizer import ARMS, GIVE_UP_SECONDS, UNCERTAIN_SECONDS, Arrival, Synchronizer, Tick
+from grasp_ros.graph.nodes.loop import Commands
 from grasp_ros.graph.nodes.lyapunov_monitor import MOST_BYTES, LyapunovMonitor
 from grasp_ros.graph.nodes.picture import Picture
+from grasp_ros.graph.nodes.synchronizer import ARMS, GIVE_UP_SECONDS, UNCERTAIN_SECONDS, Arrival, Synchronizer, Tick
+from grasp_ros.graph.parameters import Running
+from grasp_ros.graph.ros.heartbeat import digest
 from grasp_ros.graph.ros.messages import UNREADABLE
+from grasp_ros.graph.ros.peers import PeerNode
 from grasp_ros.graph.serialization import raw_command, template_of
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene, topics
@@ -51,7 +51,7 @@ class Monitor(PeerNode):
         super().__init__("monitor", **options)
         self._path = Path(self.read_only("bag") or f"grasp_{datetime.now():%Y_%m_%d-%H_%M_%S}")
         check_path(self._path)  # now, and not when a plant comes
-        self._running: runnings.Running | None = None
+        self._running: Running | None = None
         self._scene: Scene | None = None
         self._due: list[tuple[int, Tick, list[tuple[Topic, bytes]]]] = []  # time in the bag, tick, what comes beside
         self._others: list[Subscription] = []  # of what does not come with every state
@@ -59,7 +59,6 @@ class Monitor(PeerNode):
         self._early: deque[tuple[Topic, bytes]] = deque(maxlen=1000)  # what comes beside before the first state
         self._other_bytes: Counter[Topic] = Counter()  # of `_others`, since the last report
         self._plant, self._at_end = "", False  # identity of the one that is recorded; whether its last tick is
-        self._sources: dict[Topic, Sources] = {}  # of commands that come with every state
         self._acted = [0.0, 0.0, 0.0]  # N by body, in the last state
         self._commands: dict[Topic, deque[float]] = {}  # the last ones of a free run, N
         self._bag_ns = self._offset_ns = 0  # time in the bag, and what it is ahead of simulated time
@@ -72,10 +71,6 @@ class Monitor(PeerNode):
         self.on_text(topics.RUN, self._on_run)
         self.on_text(topics.SCENE, self._on_scene)
 
-    def needs(self) -> Iterator[Need]:
-        """The plant; controllers are the plant's need."""
-        yield Need(topics.JOINT_STATES)
-
     def progress(self) -> object:
         """The ticks so far."""
         return self.counters["ticks"]
@@ -86,7 +81,7 @@ class Monitor(PeerNode):
             self._gone.pop(topics.JOINT_STATES, None)
         super().look()
         if self.begun:
-            self._drain(time.monotonic() - max(self._advanced, self._watchdog.resumed))
+            self._take(time.monotonic() - max(self._advanced, self._watchdog.resumed))
 
     def heard(self) -> None:
         """Somebody has given a sign of life; if it is another plant in the place of the one that is recorded, end.
@@ -106,7 +101,7 @@ class Monitor(PeerNode):
 
     def _on_run(self, text: str) -> None:
         if self._running is None:
-            self._running = runnings.parse(text)
+            self._running = Running.parse(text)
             self._begin()
 
     def _on_scene(self, text: str) -> None:
@@ -130,7 +125,6 @@ class Monitor(PeerNode):
             [NAMES[body] for body in scene.system.present],
             scene.period_ns, scene.ticks * scene.period_ns, scene.system.delay,
         )
-        self._limits = Limits(self, scene)
         names = {topic: self.resolve_topic_name(topic.name) for topic in topics_of(scene)}
         self._recorder = Recorder(self._path, scene, versions(), names, running)
         self._soon = self.wall_timer(MOST_SECONDS, self._complete)
@@ -141,9 +135,10 @@ class Monitor(PeerNode):
         self._laws = [self.subscribe(topics.CHANGES[side], partial(self._on_announcement, side), raw=True)
                       for side, command in topics.COMMANDS.items() if command in scene.topics]
         for topic in per_tick:
-            subscription = self.subscribe(topic, partial(self._on_message, topic), raw=True)
-            if topic in topics.COMMANDS.values():
-                self._sources[topic] = Sources(subscription, UNCERTAIN_SECONDS)
+            if topic in ARMS:
+                Commands(self, scene, ARMS[topic], self._on_command, UNCERTAIN_SECONDS)
+            else:
+                self.subscribe(topic, partial(self._on_message, topic), raw=True)
         for topic in (*extra, topics.DIAGNOSTICS):
             self._others.append(self.subscribe(topic, partial(self._record, topic), raw=True))
 
@@ -170,13 +165,14 @@ class Monitor(PeerNode):
             self.refuse("refused announcements", topics.CHANGES[side], str(error))
         self.counters["lost announcements"] = self._lyapunov.lost
 
-    def _on_message(self, topic: Topic, cdr: bytes) -> None:
-        known = self._sources.get(topic)  # of commands: is this one nobody else's?
-        sure = known is None or (known.settled() and known.number < 2 and (command := raw_command(cdr)) is not None
-                                 and self._limits.allow(topic, command[1]))
+    def _on_command(self, own: Commands, cdr: bytes) -> None:
+        sure = own.settled() and own.number < 2 and (command := raw_command(cdr)) is not None and own.allow(command[1])
+        self._on_message(own.topic, cdr, sure)  # which may be of somebody else, or beyond the limit
+
+    def _on_message(self, topic: Topic, cdr: bytes, sure: bool = True) -> None:
         arrival = self._synchronizer.put(topic, cdr, sure)
         if arrival is Arrival.TAKEN:
-            self._drain()
+            self._take()
         elif arrival is Arrival.AGAIN:
             self.count(arrival.value)
             if not self._awaits_laws():  # what was published has been lost
@@ -187,35 +183,32 @@ class Monitor(PeerNode):
         else:
             self.refuse(arrival.value, topic)
 
-    def _drain(self, waited: float = 0.0) -> None:
-        while (tick := self._synchronizer.take(waited)) is not None:
-            self._take(tick)
-
     def report(self) -> None:
         """Publish the counters."""
         super().report()
         self._other_bytes.clear()
 
-    def _take(self, tick: Tick) -> None:
-        """Put a tick in its place in the bag's time; evaluate what waits once there is enough, or something changes."""
+    def _take(self, waited: float = 0.0) -> None:
+        """Put ticks in their place in the bag's time; evaluate what waits once it is enough, or something changes."""
         assert self._scene is not None
-        if tick.restarted or self._lyapunov.changes(tick.time_ns):
-            self._complete()
-        if tick.restarted:
-            self._offset_ns = self._bag_ns + self._scene.period_ns - tick.time_ns
-            self._lyapunov.restart()
-            self.count("resets")
-        self._bag_ns, self._advanced = tick.time_ns + self._offset_ns, time.monotonic()
-        self._acted = tick.state.inputs
-        self.count("restored commands", tick.restored)
-        self.count("lost messages", tick.lost)
-        self.count("messages without a state", tick.dropped)
-        self._due.append((self._bag_ns, tick, [*self._early, *self._lyapunov.begin(tick.time_ns)]))
-        self._early.clear()
-        if len(self._due) >= MOST_TICKS or tick.time_ns == self._synchronizer.end_ns:
-            self._complete()
-        else:
-            self._let_wait()
+        while (tick := self._synchronizer.take(waited)) is not None:
+            if tick.restarted or self._lyapunov.changes(tick.time_ns):
+                self._complete()
+            if tick.restarted:
+                self._offset_ns = self._bag_ns + self._scene.period_ns - tick.time_ns
+                self._lyapunov.restart()
+                self.count("resets")
+            self._bag_ns, self._advanced = tick.time_ns + self._offset_ns, time.monotonic()
+            self._acted = tick.state.inputs
+            self.count("restored commands", tick.restored)
+            self.count("lost messages", tick.lost)
+            self.count("messages without a state", tick.dropped)
+            self._due.append((self._bag_ns, tick, [*self._early, *self._lyapunov.begin(tick.time_ns)]))
+            self._early.clear()
+            if len(self._due) >= MOST_TICKS or tick.time_ns == self._synchronizer.end_ns:
+                self._complete()
+            else:
+                self._let_wait()
 
     def _let_wait(self) -> None:
         """Let ticks wait for others for a while."""

@@ -11,24 +11,26 @@ from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 from typing import Any
 
+from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 from rclpy.duration import Duration
 from std_msgs.msg import String
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status, compile_kernels
-from grasp_ros.graph.health.heartbeat import digest
-from grasp_ros.graph.health.peers import SLOW, Need, PeerNode
-from grasp_ros.graph.lockstep.free_running import FreeRunning
-from grasp_ros.graph.lockstep.lockstep import Lockstep
-from grasp_ros.graph.lockstep.steering import Steering
+from grasp_ros.graph.nodes.free_running import FreeRunning
+from grasp_ros.graph.nodes.lockstep import Lockstep
+from grasp_ros.graph.parameters import Running, check_factor
+from grasp_ros.graph.ros.heartbeat import digest
 from grasp_ros.graph.ros.node import Phase
-from grasp_ros.graph.running import Running, check_factor
+from grasp_ros.graph.ros.peers import SLOW, Need, PeerNode
 from grasp_ros.graph.serialization import SHORTEST, raw_stamp_ns, template_of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW
 from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.sampled_plant import SampledPlant
+
+MOST_STEPS = 10**9
 
 
 class Plant(PeerNode):
@@ -44,9 +46,21 @@ class Plant(PeerNode):
         progress = self.read_only("progress")
         free = self.read_only("free_running")
         waits = free and self.read_only("wait_for_controllers")
-        steering = Steering(self)
+        paused = self.read_only("paused")
+        default, text = self._settings["steps"]  # of one call of the service `step`
+        self.declare("steps", default, ParameterDescriptor(
+            description=text, integer_range=[IntegerRange(from_value=1, to_value=MOST_STEPS, step=1)],
+        ))
         scene = scenes.load(name)
-        running = self._read_running(scene) if free else Running(self._accuracy)
+        running = Running(self._accuracy)
+        if free:  # parameters that exist only there
+            factor = self.read_only("real_time_factor")
+            check_factor(factor)
+            timeouts, reactions = {}, {}
+            for side in (NAMES[body] for body in scene.system.laws):
+                timeouts[side] = self.read_only(f"{side}_timeout_s")
+                reactions[side] = self.read_only(f"{side}_on_timeout")
+            running = Running(self._accuracy, factor, timeouts, reactions)
         self.scene = scene.changed(self.declare_scene(scene, "plant"))
         for warning in self.scene.warnings:
             self.get_logger().warning(warning)
@@ -73,17 +87,8 @@ class Plant(PeerNode):
         compile_kernels()  # while others get ready for this scene
         if self.monitored:
             self.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
-        self.loop = FreeRunning(self, steering, running, waits) if free else Lockstep(self, steering)
+        self.loop = FreeRunning(self, paused, running, waits) if free else Lockstep(self, paused)
         self.when(self._ready, self._start)
-
-    def _read_running(self, scene: scenes.Scene) -> Running:
-        """How it runs with the wall clock, from parameters that exist only there."""
-        factor = self.read_only("real_time_factor")
-        check_factor(factor)
-        timeouts, reactions = {}, {}
-        for side in (NAMES[body] for body in scene.system.laws):
-            timeouts[side], reactions[side] = self.read_only(f"{side}_timeout_s"), self.read_only(f"{side}_on_timeout")
-        return Running(self._accuracy, factor, timeouts, reactions)
 
     def _new_plant(self) -> SampledPlant:
         system = self.scene.system
@@ -164,7 +169,10 @@ class Plant(PeerNode):
         if busy and not missing:
             self.words = f"waiting for {' and '.join(busy)} to take this scene"
         elif missing:
-            incompatible = self.incompatible(self.scene.controllers.values())
+            incompatible = [f"not connected: {writer.node_name}, whose {topic.name} is {writer.topic_type},"
+                            f" {writer.qos_profile.reliability.name.lower()}; needed: {topic.type}, reliable"
+                            for topic in self.scene.controllers.values()
+                            for writer in self.writers(topic, connected=False)]
             self.words = "; ".join((f"waiting for {', '.join(missing)}", *incompatible))
         else:
             deaf = [topic.name for topic in self.loop.topics if not self.linked(self._states, [topic])]

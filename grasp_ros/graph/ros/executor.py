@@ -53,7 +53,10 @@ def _live(
     """Make the nodes, run them until there is nothing left to do, and close them; returns the exit status."""
     names = together = ", ".join(makes)
     try:
-        _start(context)
+        try:
+            rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+        except RuntimeError as error:  # the base of what rcl raises
+            raise Refused(f"ROS does not start: {words_of(error)}") from None
         try:
             for names, make in makes.items():  # noqa: B007 - which one is refused
                 nodes.append(make(context=context))
@@ -80,14 +83,6 @@ def _live(
             print(f"{names}: {words}", file=sys.stderr)
         return 1
     return next((node.exit_code for node in nodes if node.exit_code), 0)
-
-
-def _start(context: Context) -> None:
-    """Let ROS begin, without signal handlers of its own."""
-    try:
-        rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
-    except RuntimeError as error:  # the base of what rcl raises
-        raise Refused(f"ROS does not start: {words_of(error)}") from None
 
 
 def _spin(nodes: Sequence[GraspNode], received: Sequence[int], names: str) -> None:

@@ -87,11 +87,6 @@ def to_time(time_ns: int) -> Time:
     return Time(sec=time_ns // NANOSECONDS, nanosec=time_ns % NANOSECONDS)
 
 
-def to_ns(stamp: Time) -> int:
-    """Integer time in ns of a stamp."""
-    return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
-
-
 class State(NamedTuple):
     """A state of the plant."""
 

@@ -45,12 +45,6 @@ class Phase(Enum):
     FAILED = "failed"
 
 
-def _is_compatible(writer: TopicEndpointInfo, topic: Topic) -> bool:
-    """Whether a reader of a topic is connected with a publisher: by the type and the quality of service."""
-    connects = messages.connects(writer.qos_profile, messages.reader_qos(topic))
-    return bool(writer.topic_type == topic.type and connects)
-
-
 class GraspNode(ParameterNode):
     """A node with counters on /diagnostics and an end."""
 
@@ -111,16 +105,10 @@ class GraspNode(ParameterNode):
             for writer in self.writers(topic)
         )
 
-    def writers(self, topic: Topic) -> list[TopicEndpointInfo]:
-        """Publishers that a reader of a topic is connected with; not those of another type or quality of service."""
-        return [writer for writer in self.get_publishers_info_by_topic(topic.name) if _is_compatible(writer, topic)]
-
-    def incompatible(self, topics: Iterable[Topic]) -> list[str]:
-        """Publishers that no reader of these topics is connected with, in words."""
-        return [f"not connected: {writer.node_name}, whose {topic.name} is {writer.topic_type},"
-                f" {writer.qos_profile.reliability.name.lower()}; needed: {topic.type}, reliable"
-                for topic in topics for writer in self.get_publishers_info_by_topic(topic.name)
-                if not _is_compatible(writer, topic)]
+    def writers(self, topic: Topic, connected: bool = True) -> list[TopicEndpointInfo]:
+        """Publishers that a reader of a topic is connected with, or those of another type or quality of service."""
+        return [writer for writer in self.get_publishers_info_by_topic(topic.name) if connected is (
+            writer.topic_type == topic.type and messages.connects(writer.qos_profile, messages.reader_qos(topic)))]
 
     def readers(self, publisher: Publisher) -> list[TopicEndpointInfo]:
         """Subscriptions that a publisher is connected with, as soon as discovery is through."""

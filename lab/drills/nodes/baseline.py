@@ -83,7 +83,7 @@ class Baseline(Node):
                 self.publish_state()
 
     def _on_state(self, message: Any) -> None:
-        self._outputs[0].publish(plain_messages.wrench(messages.to_ns(message.header.stamp), 0.0))
+        self._outputs[0].publish(plain_messages.wrench(plain_messages.to_ns(message.header.stamp), 0.0))
 
     def _on_anything(self, cdr: bytes) -> None:
         self._now_ns += 1

@@ -153,7 +153,7 @@ class FaultInjector:
         row = state.name.index(side)
         if force is None:
             force = -POSITION_GAIN * state.position[row] - VELOCITY_GAIN * state.velocity[row]
-        message = plain_messages.wrench(messages.to_ns(state.header.stamp), force)
+        message = plain_messages.wrench(plain_messages.to_ns(state.header.stamp), force)
         filled(message, {key: value for key, value in self._answer.items() if key not in ("side", "force", "times")})
         for _ in range(times):
             self._commands.publish(message)

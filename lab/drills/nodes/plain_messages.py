@@ -9,6 +9,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Sequence
 
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import WrenchStamped
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -16,7 +17,13 @@ from sensor_msgs.msg import JointState
 from grasp_ros.graph.ros.messages import to_time
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.topics import FRAME, LYAPUNOV_NAMES
+
+
+def to_ns(stamp: Time) -> int:
+    """Integer time in ns of a stamp."""
+    return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
 
 
 def joint_state(time_ns: int, bodies: Sequence[int], state: Array, inputs: Array) -> JointState:

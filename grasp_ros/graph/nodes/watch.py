@@ -21,8 +21,8 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from grasp_ros import scene as scenes
-from grasp_ros.graph import running as runnings
-from grasp_ros.graph.lockstep.steering import PAUSED
+from grasp_ros.graph.nodes.loop import PAUSED
+from grasp_ros.graph.parameters import Running
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.graph.serialization import MOST_BYTES, SHORTEST, raw_force, raw_stamp_ns
@@ -76,7 +76,7 @@ class Watch(GraspNode):
         self._found, self._state, self._stale = {}, -1, 0.0
 
     def _on_run(self, message: Any) -> None:
-        self._lockstep = runnings.parse(message.data).lockstep
+        self._lockstep = Running.parse(message.data).lockstep
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
         if not SHORTEST <= len(cdr) <= MOST_BYTES:

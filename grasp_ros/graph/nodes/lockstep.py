@@ -9,15 +9,13 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from grasp_ros.graph.health.peers import Need
-from grasp_ros.graph.lockstep.admission import Limits, Sources
-from grasp_ros.graph.lockstep.steering import Steering
+from grasp_ros.graph.nodes.loop import Commands, Loop
 from grasp_ros.graph.ros.node import NEW
+from grasp_ros.graph.ros.peers import Need
 from grasp_ros.graph.serialization import raw_command
 from grasp_ros.scene.topics import LYAPUNOV, WINDOW, Topic
 
@@ -31,32 +29,25 @@ LATE_TICKS = 10  # a second state within them that is not answered at once: some
 UNCONTROLLED_SECONDS = 1e-4  # wall time between the ticks of a scene without controllers
 
 
-class Lockstep:
+class Lockstep(Loop):
     """Takes the commands, and advances the plant when all of a tick are there."""
 
-    def __init__(self, plant: Plant, steering: Steering) -> None:
-        self._plant, self._steering = plant, steering
-        self._commands: dict[int, float] = {}
-        self.answered = False  # whether a state of this run was
+    def __init__(self, plant: Plant, paused: bool) -> None:
+        super().__init__(plant, paused, SETTLE_SECONDS)  # what has been received answers the current state
         self._asked, self._asked_ns = 0.0, -1  # wall time of the last repetition, and the stamp of its state
         self._timer: Any = None
         plant.counters.update({
             "stale commands": 0, "repeated commands": 0, "refused commands": 0, "commands beyond a limit": 0,
             "commands while sources change": 0, "late answers": 0, "repeated states": 0,
         })
-        self.topics = list(plant.scene.controllers.values())
-        self._sources = {
-            topic: Sources(plant.subscribe(topic, partial(self._on_command, side, topic), raw=True), SETTLE_SECONDS)
-            for side, topic in zip(plant.scene.system.laws, self.topics, strict=True)
-        }
-        self._limits = Limits(plant, plant.scene)
-        self._unsettled: dict[Topic, float] = {}  # topics whose commands do not count, and since when
+        self.topics = [own.topic for own in self._commands]
+        self._unsettled: dict[Commands, float] = {}  # those that do not count, and since when
         self._seen: set[str] = set()  # their sources, also those that are gone again
 
     def missing(self) -> list[str]:
         """Command topics that do not have exactly one source, with the names of several."""
-        for sources in self._sources.values():
-            sources.begin()
+        for own in self._commands:
+            own.begin()
         return [*filter(None, map(self._plant.missing, self.topics))]
 
     def start(self) -> None:
@@ -64,17 +55,14 @@ class Lockstep:
         if not self.topics:
             self._timer = self._plant.wall_timer(UNCONTROLLED_SECONDS, self.advance)
 
-    def report(self) -> None:
-        """Nothing: who does not answer is named by the plant."""
-
     def needs(self) -> Iterator[Need]:
         """Controllers that answer the current state, and a monitor that records it."""
         plant = self._plant
         refused = plant.counters["refused commands"] or plant.counters["commands beyond a limit"]
         what = f"answer{' that is allowed' if refused else ''} to tick {plant.tick}"
-        for topic, side in zip(self.topics, plant.scene.system.laws, strict=True):
-            due = math.inf if side in self._commands or topic in self._unsettled else plant.published_at
-            yield Need(topic, what, due, first=not self.answered, replaceable=True)
+        for own in self._commands:
+            due = math.inf if own.received or own in self._unsettled else plant.published_at
+            yield Need(own.topic, what, due, first=not self.answered, replaceable=True)
         if plant.monitored:
             due = max(plant.published_at, plant.recorded_at) if self._complete and self._ahead else math.inf
             yield Need(LYAPUNOV, what, due)
@@ -86,16 +74,14 @@ class Lockstep:
         if self._unsettled:
             self._settle(now)
         elif (self._ahead or not self._complete) and now - since > patience:
-            self._name_late()
+            period_ns = self._plant.scene.period_ns
+            # Who answers so late that the graph crawls misses no deadline, for each state is answered at last.
+            if self._asked_ns >= 0 and 0 < self._plant.tick * period_ns - self._asked_ns <= LATE_TICKS * period_ns:
+                why = f"a state is published again after {REPEAT_SECONDS:g} s"
+                for own in self._commands:
+                    if not own.received:
+                        self._plant.refuse("late answers", own.topic, why)
             self._repeat(now)
-
-    def _name_late(self) -> None:
-        """Say who answers so late that the graph crawls: no deadline is missed, for each state is answered at last."""
-        period_ns = self._plant.scene.period_ns
-        if self._asked_ns >= 0 and 0 < self._plant.tick * period_ns - self._asked_ns <= LATE_TICKS * period_ns:
-            for side, topic in zip(self._plant.scene.system.laws, self.topics, strict=True):
-                if side not in self._commands:
-                    self._plant.refuse("late answers", topic, f"a state is published again after {REPEAT_SECONDS:g} s")
 
     def _repeat(self, now: float) -> None:
         self._asked, self._asked_ns = now, self._plant.tick * self._plant.scene.period_ns
@@ -104,44 +90,41 @@ class Lockstep:
 
     def _settle(self, now: float) -> None:
         """Ask again once the sources of the commands are the same for a while, and one of each is alive; or end."""
-        for topic, since in tuple(self._unsettled.items()):
-            self._seen.update(self._plant.sources(topic))
-            if self._sources[topic].settled() and self._alone(topic):
-                del self._unsettled[topic]
+        for own, since in tuple(self._unsettled.items()):
+            self._seen.update(names := self._plant.sources(own.topic))
+            if own.settled() and (  # one is left, or what DDS still lists beside it is known to be dead
+                own.number < 2 or (len(names) >= own.number and len(self._plant.living(own.topic)) < 2)
+            ):
+                del self._unsettled[own]
             elif now - since > self._plant.patience:
-                self._refuse_sources(topic, now - since - self._plant.patience)
+                self._refuse_sources(own.topic, now - since - self._plant.patience)
                 return
         if not self._unsettled:
             self._repeat(now)
 
-    def _alone(self, topic: Topic) -> bool:
-        """Whether one source is left, or what DDS still lists beside it is known to be dead."""
-        number = self._sources[topic].number
-        return number < 2 or (len(self._plant.sources(topic)) >= number and len(self._plant.living(topic)) < 2)
-
     @property
     def _complete(self) -> bool:
         """Whether all commands are there that answer the current state."""
-        return len(self._commands) == len(self.topics)
+        return all(own.received for own in self._commands)
 
     @property
     def _ahead(self) -> bool:
         """Whether the plant has to wait for its monitor."""
-        return self._plant.outrun(0 if self._steering.reset_due or self._plant.at_end else WINDOW)
+        return self._plant.outrun(0 if self.reset_due or self._plant.at_end else WINDOW)
 
-    def _on_command(self, side: int, topic: Topic, cdr: bytes) -> None:
+    def _on_command(self, own: Commands, cdr: bytes) -> None:
         command = raw_command(cdr)
         if command is None:
-            self._plant.refuse("refused commands", topic)
+            self._plant.refuse("refused commands", own.topic)
         elif not self._plant.begun or command[0] != self._plant.tick * self._plant.scene.period_ns:
-            self._count_more("stale commands", topic, command[0])
-        elif side in self._commands:
-            self._count_more("repeated commands", topic, command[0])
-        elif topic in self._unsettled or not self._sources[topic].settled():  # it is asked for again
-            self._unsettled.setdefault(topic, time.monotonic())
-            self._plant.refuse("commands while sources change", topic)
-        elif self._limits.admit(topic, command[1]):
-            self._commands[side] = command[1]
+            self._count_more("stale commands", own.topic, command[0])
+        elif own.received:
+            self._count_more("repeated commands", own.topic, command[0])
+        elif own in self._unsettled or not own.settled():  # it is asked for again
+            self._unsettled.setdefault(own, time.monotonic())
+            self._plant.refuse("commands while sources change", own.topic)
+        elif own.admit(command[1]):
+            own.received, own.force = True, command[1]
             self.advance()
 
     def _count_more(self, counter: str, topic: Topic, stamp_ns: int) -> None:
@@ -152,26 +135,25 @@ class Lockstep:
             self._plant.refuse(counter, topic)
 
     def advance(self) -> None:
-        """Do what is due once the current state has been answered: reset, finish, pause or advance."""
+        """Do what is due once the current state has been answered."""
         plant = self._plant
-        resetting, ahead = self._steering.reset_due, self._ahead
-        going = not ahead and (resetting or not self._steering.halted)
+        resetting, ahead = self.reset_due, self._ahead
+        going = not ahead and (resetting or not self.halted)
         if self._timer is not None and going is self._timer.is_canceled():  # it would keep others from their turn
             (self._timer.reset if going else self._timer.cancel)()
         if not plant.begun or plant.finished or ahead or not self._complete:
             return
         self.answered = True
         if resetting:
-            self._commands.clear()
-            self._steering.reset_done()
-        elif self._steering.go_on():
+            self.reset_done()
+        elif self.go_on():
             if plant.at_end:
                 plant.finish()
             else:
                 forces = np.zeros(3)
-                for side, force in self._commands.items():
-                    forces[side] = force
-                self._commands.clear()
+                for own in self._commands:
+                    forces[own.body] = own.force
+                    own.clear()
                 plant.step(forces)
 
     def _refuse_sources(self, topic: Topic, waited: float) -> None:

@@ -10,9 +10,8 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, NamedTuple
 
-from grasp_ros.graph.health.heartbeat import ENDED, Heartbeat, Heartbeats, digest
-from grasp_ros.graph.health.watchdog import Watchdog
 from grasp_ros.graph.parameters import check_timeouts
+from grasp_ros.graph.ros.heartbeat import ENDED, Heartbeat, Heartbeats, Watchdog, digest
 from grasp_ros.graph.ros.node import ACKNOWLEDGE_SECONDS, NEW, PATIENCE_SECONDS, GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import TEXT_BYTES
@@ -78,9 +77,9 @@ class PeerNode(GraspNode):
         self._before: object = None  # progress at the last look
         self.wall_timer(LOOK_SECONDS, self.look)
 
-    @abstractmethod
     def needs(self) -> Iterator[Need]:
-        """What this node needs of others now that it has begun."""
+        """What this node needs of others now that it has begun: the plant, which itself needs all others."""
+        yield Need(JOINT_STATES)
 
     def blocking_limit(self) -> float | None:
         """Time in s that its thread may be blocked, as by a law that does not return; None: any, before it begins."""
@@ -229,7 +228,8 @@ class PeerNode(GraspNode):
             if beat and before not in ("", beat.identity) and not self.heartbeats.successor(before):
                 self._held.add(name)  # a newer plant than the one that is there gives way, or takes over later
                 continue
-            waits = time.monotonic() - when < self.patience or self._has_ended(topic)
+            waits = time.monotonic() - when < self.patience or any(  # a source has just ended: none has its digests
+                known.ended for known in self.heartbeats.of(self.sources(topic)))
             if beat is None and waits and name not in self._held:
                 continue
             self._texts.remove(entry)
@@ -240,10 +240,6 @@ class PeerNode(GraspNode):
             elif (known := (name, beat.identity if beat else "")) != self._taken.get(topic) or beat is None:
                 self._taken[topic] = known
                 take(text)
-
-    def _has_ended(self, topic: Topic) -> bool:
-        """Whether a source of a topic has just ended: no heartbeat has the digests of its texts any more."""
-        return any(beat.ended for beat in self.heartbeats.of(self.sources(topic)))
 
     def _is_from_another_program(self, topic: Topic) -> bool:
         """Whether a text may be of a plant of another program: no heartbeat has any digest, and it publishes states."""

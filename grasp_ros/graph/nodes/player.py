@@ -9,9 +9,8 @@ from typing import Any
 
 from grasp_ros.graph.bag import EmptyBagError
 from grasp_ros.graph.bag.opening import Opened
-from grasp_ros.graph.ros import messages
+from grasp_ros.graph.parameters import check_factor
 from grasp_ros.graph.ros.node import GraspNode, Phase
-from grasp_ros.graph.running import check_factor
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.topics import JOINT_STATES, WINDOW
 
@@ -38,8 +37,7 @@ class Player(GraspNode):
             raise EmptyBagError(f"{bag.path}: holds no tick")
         self._rows = chain(begin[1:], bag.messages)
         self._next, self._first_ns = begin[0], begin[0][1].time_ns
-        self._outputs = {topic: self.create_publisher(messages.TYPES[topic.type], name, messages.qos(topic))
-                         for topic, name in bag.names.items()}
+        self._outputs = {topic: self.publisher(topic._replace(name=name)) for topic, name in bag.names.items()}
         self.counters["messages"] = 0
         self._created, self._begin = time.monotonic(), math.nan
         self.when(self._ready, self._start)

@@ -11,21 +11,17 @@ import math
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from grasp_ros.graph.health.peers import Need
-from grasp_ros.graph.lockstep.admission import Limits
-from grasp_ros.graph.lockstep.steering import Steering
-from grasp_ros.graph.running import Running
+from grasp_ros.graph.nodes.loop import Commands, Loop
+from grasp_ros.graph.parameters import Running
+from grasp_ros.graph.ros.peers import Need
 from grasp_ros.graph.serialization import list_message, raw_command
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.topics import LYAPUNOV, TIMING, Topic, timing_names
+from grasp_ros.scene.topics import LYAPUNOV, TIMING, timing_names
 
 if TYPE_CHECKING:  # it imports this one
     from grasp_ros.graph.nodes.plant import Plant
@@ -41,25 +37,12 @@ PERCENTILE = 99.0
 OLDEST = 10_000  # periods that are told apart in the ages of commands
 
 
-@dataclass
-class Held:
-    """The command of one controller that is held."""
-
-    force: float = 0.0  # N
-    # Tick of the state that it answers, from which its age counts; that of its arrival where it carries no stamp.
-    answers: int = 0
-    late: bool = False  # whether it is older than the timeout
-    received: bool = False  # whether one has come
-
-
-class FreeRunning:
+class FreeRunning(Loop):
     """Advances the plant with the wall clock; if it `waits`, from when each side has sent a command."""
 
-    def __init__(self, plant: Plant, steering: Steering, running: Running, waits: bool) -> None:
-        self._plant, self._steering, self._running = plant, steering, running
-        self._awaits = waits and bool(plant.scene.controllers)
-        self.answered = False  # whether all sides have answered a state of this run
-        self.topics: list[Topic] = []  # of which it needs each message
+    def __init__(self, plant: Plant, paused: bool, running: Running, waits: bool) -> None:
+        super().__init__(plant, paused)
+        self._running, self._awaits = running, waits and bool(plant.scene.controllers)
         self._period = plant.scene.period_ns / NANOSECONDS / running.real_time_factor  # s of wall time
         self._timeouts = {
             side: max(1, math.ceil(seconds * NANOSECONDS / plant.scene.period_ns))
@@ -67,81 +50,65 @@ class FreeRunning:
         }
         plant.counters.update({"stale commands": 0, "refused commands": 0, "commands beyond a limit": 0,
                                "timeouts": 0})
-        self._held = {NAMES[body]: Held() for body in plant.scene.system.laws}
-        self._timing = Timing([*self._held], self._period, running.real_time_factor)
+        self._timing = Timing([own.side for own in self._commands], self._period, running.real_time_factor)
         self._quality = plant.publisher(TIMING)
-        for side, topic in zip(self._held, plant.scene.controllers.values(), strict=True):
-            plant.subscribe(topic, partial(self._on_command, side, topic), raw=True)
-        self._limits = Limits(plant, plant.scene)
         self._anchor = math.nan  # wall time of tick 0
         self._turn = 0.0  # wall time up to which others have their turn
 
     def missing(self) -> list[str]:
         """Commands that nobody sends yet, where it waits for them; else it begins without controllers."""
-        topics = self._plant.scene.controllers.values() if self._awaits else ()
-        return [topic.name for topic in topics if not self._plant.writers(topic)]
+        awaited = self._commands if self._awaits else ()
+        return [own.topic.name for own in awaited if not self._plant.writers(own.topic)]
 
     def needs(self) -> Iterator[Need]:
         """The monitor, and first commands where it waits for them; later ones have timeouts of their own."""
         if self._awaits:
-            for topic, held in zip(self._plant.scene.controllers.values(), self._held.values(), strict=True):
-                due = math.inf if held.received else self._plant.published_at
-                yield Need(topic, "first command", due, first=True, replaceable=True)
+            for own in self._commands:
+                due = math.inf if own.received else self._plant.published_at
+                yield Need(own.topic, "first command", due, first=True, replaceable=True)
         if self._plant.monitored:
             due = self._plant.published_at if self._awaits and self.answered else math.inf
             yield Need(LYAPUNOV, "sign of having had a command of each side", due, first=True)
 
     def ask_again(self, now: float) -> None:
         """Publish a state again while it waits for an answer to it: the first one, and one that is to be reset."""
-        if self._awaits or self._steering.reset_due:
+        if self._awaits or self.reset_due:
             self._plant.repeat()
 
     def start(self) -> None:
         """Look at the clock from now on; it runs once nobody is waited for."""
         self._plant.wall_timer(max(self._period / LOOKS, SHORTEST_SECONDS), self.advance)
 
-    def _set_anchor(self) -> None:
-        self._anchor = time.monotonic() - self._plant.tick * self._period
-
-    def _on_command(self, side: str, topic: Topic, cdr: bytes) -> None:
-        plant, held, command = self._plant, self._held[side], raw_command(cdr)
+    def _on_command(self, own: Commands, cdr: bytes) -> None:
+        plant, command = self._plant, raw_command(cdr)
         stamp, force = command or (0, math.nan)
         tick = stamp // plant.scene.period_ns if stamp else plant.tick
         if command is None or (tick > plant.tick and not plant.resets):  # else it may come from before a reset
-            plant.refuse("refused commands", topic)
-        elif not held.answers <= tick <= plant.tick:
+            plant.refuse("refused commands", own.topic)
+        elif not own.answers <= tick <= plant.tick:
             plant.count("stale commands")
-        elif self._limits.admit(topic, force):
-            held.force, held.answers, held.received = force, tick, True
-            self.answered = self.answered or all(own.received for own in self._held.values())
-            self._awaits = self._awaits and not (self.answered and self._heard)
+        elif own.admit(force):
+            own.force, own.answers, own.received = force, tick, True
+            self.answered = self.answered or all(own.received for own in self._commands)
+            if self._awaits and self.answered:  # DDS may connect a controller with the monitor seconds after the plant
+                heard = {name for beat in plant.heartbeats.alive for name in beat.hears}
+                self._awaits = plant.monitored and not heard >= {each.topic.name for each in self._commands}
             self.advance()
-
-    @property
-    def _heard(self) -> bool:
-        """Whether the monitor has had commands of all: DDS may connect a controller with it seconds after the plant."""
-        heard = {name for beat in self._plant.heartbeats.alive for name in beat.hears}
-        return not self._plant.monitored or heard >= {topic.name for topic in self._plant.scene.controllers.values()}
 
     def advance(self) -> None:
         """Compute the periods that are over."""
         plant = self._plant
         if plant.finished or not plant.begun or self._awaits:
             return
-        if math.isnan(self._anchor):
-            self._set_anchor()
-        if self._steering.reset_due:
+        if resetting := self.reset_due:
             if plant.outrun(0):  # it would take what comes after a reset for what came before: the stamps are the same
                 return
-            self._held = {side: Held() for side in self._held}
-            self._steering.reset_done()
+            self.reset_done()
+        if resetting or self.halted or math.isnan(self._anchor):
             self._timing.pause()
-            self._set_anchor()
-        if self._steering.halted:
-            self._timing.pause()
-            self._set_anchor()
-            return
-        self._catch_up()
+            self._anchor = time.monotonic() - plant.tick * self._period
+        if not self.halted:
+            self._catch_up()
 
     def _catch_up(self) -> None:
         plant, begin = self._plant, time.monotonic()
@@ -155,13 +122,13 @@ class FreeRunning:
             due = self._anchor + (plant.tick + 1) * self._period
             if now < due or plant.outrun() or (now - due > self._period and self._waits(now)):
                 return
-            if not self._steering.go_on():
+            if not self.go_on():
                 return
             if plant.at_end:
                 plant.finish()
                 return
             self._timing.period(now, now - due)
-            self._step()
+            self._compute()
         if time.monotonic() > begin + 2.0 * BURST_SECONDS:  # the timer is due again, before all else
             self._turn = time.monotonic() + TURN_SECONDS
 
@@ -169,21 +136,21 @@ class FreeRunning:
         """Whether a controller that keeps up is about to answer the current state."""
         tick = self._plant.tick
         return now - self._plant.published_at < GRACE * self._period and any(
-            0 < tick - held.answers <= KEEPS_UP and not held.late for held in self._held.values()
+            0 < tick - own.answers <= KEEPS_UP and not own.late for own in self._commands
         )
 
-    def _step(self) -> None:
+    def _compute(self) -> None:
         forces: Array = np.zeros(3)
-        for body, (side, held) in zip(self._plant.scene.system.laws, self._held.items(), strict=True):
-            before, held.late = held.late, self._plant.tick - held.answers >= self._timeouts[side]
-            reaction = self._running.reactions[side]
-            if held.late and not before:
+        for own in self._commands:
+            before, own.late = own.late, self._plant.tick - own.answers >= self._timeouts[own.side]
+            reaction = self._running.reactions[own.side]
+            if own.late and not before:
                 self._plant.count("timeouts")
-                words = (f"{side}: no command newer than {self._running.timeouts[side]:g} s at tick {self._plant.tick};"
-                         f" reaction: {reaction}")
+                words = (f"{own.side}: no command newer than {self._running.timeouts[own.side]:g} s at tick"
+                         f" {self._plant.tick}; reaction: {reaction}")
                 (self._plant.fail if reaction == "stop" else self._plant.get_logger().warning)(words)
-            forces[body] = 0.0 if held.late and reaction == "zero" else held.force
-            self._timing.age(side, self._plant.tick - held.answers, held.late)
+            forces[own.body] = 0.0 if own.late and reaction == "zero" else own.force
+            self._timing.age(own.side, self._plant.tick - own.answers, own.late)
         if self._plant.finished:
             return
         if self._plant.tick + 1 == self._plant.scene.ticks:
@@ -193,7 +160,7 @@ class FreeRunning:
 
     def report(self) -> None:
         """Publish the quality of the last second; say whose commands are missing."""
-        late = [f"no recent command of {side}" for side, held in self._held.items() if held.late]
+        late = [f"no recent command of {own.side}" for own in self._commands if own.late]
         self._plant.concern = "; ".join(late)
         if values := self._timing.take():
             time_ns = self._plant.tick * self._plant.scene.period_ns

@@ -1,1 +1,0 @@
-"""Who is there, who is silent, and who has ended."""

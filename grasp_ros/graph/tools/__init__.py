@@ -1,1 +1,0 @@
-"""What a user watches, steers and plays with."""
