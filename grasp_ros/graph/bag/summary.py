@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from grasp_ros.graph.bag.recorder import LEFT_OUT, SOURCE
 from grasp_ros.graph.bag.recording import Recording
@@ -55,21 +54,18 @@ def _levels(recording: Recording) -> dict[str, Any]:
     work, alarm = (recording.lyapunov[:, LYAPUNOV_NAMES.index(name)] for name in ("work", "alarm"))
     follows = np.diff(recording.tick, prepend=-1) == 1  # else the monitor knows no energy before
     balanced, level = int(np.count_nonzero(follows & ~np.isnan(work + alarm))), recording.energy
-    whole = balanced == recording.tick[-1] + 1
+    whole, contacts = balanced == recording.tick[-1] + 1, {}
+    for side, flag in (("left", Mode.LEFT), ("right", Mode.RIGHT)):
+        touching = (level.mode & int(flag)) != 0
+        before = np.append(False, touching[:-1]) & ~np.isin(recording.tick, recording.starts)  # a reset begins anew
+        contacts[side] = int(np.count_nonzero(touching & ~before))
     return {
-        "contacts": {side: _beginnings(recording, level.mode, flag)
-                     for side, flag in (("left", Mode.LEFT), ("right", Mode.RIGHT))},
+        "contacts": contacts,
         "energy_of": recording.energy_of, "V_J": level.V[[0, -1]].tolist(),
         "V_c_J": level.V_c[[0, -1]].tolist(),
         "work_J": 0.5 * float(np.sum(work)) if whole else math.nan, "balanced_ticks": balanced,
         "alarms": recording.alarms,
     }
-
-
-def _beginnings(recording: Recording, mode: NDArray[np.int64], flag: Mode) -> int:
-    touching = (mode & int(flag)) != 0
-    before = np.append(False, touching[:-1]) & ~np.isin(recording.tick, recording.starts)  # a reset begins anew
-    return int(np.count_nonzero(touching & ~before))
 
 
 def verified(verification: Verification) -> dict[str, Any]:

@@ -19,7 +19,6 @@ from grasp_ros.graph.nodes.loop import Commands, Loop
 from grasp_ros.graph.parameters import Running
 from grasp_ros.graph.ros.peers import Need
 from grasp_ros.graph.serialization import list_message, raw_command
-from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.topics import LYAPUNOV, TIMING, timing_names
 
@@ -44,10 +43,6 @@ class FreeRunning(Loop):
         super().__init__(plant, paused)
         self._running, self._awaits = running, waits and bool(plant.scene.controllers)
         self._period = plant.scene.period_ns / NANOSECONDS / running.real_time_factor  # s of wall time
-        self._timeouts = {
-            side: max(1, math.ceil(seconds * NANOSECONDS / plant.scene.period_ns))
-            for side, seconds in running.timeouts.items()
-        }
         plant.counters.update({"stale commands": 0, "refused commands": 0, "commands beyond a limit": 0,
                                "timeouts": 0})
         self._timing = Timing([own.side for own in self._commands], self._period, running.real_time_factor)
@@ -140,23 +135,23 @@ class FreeRunning(Loop):
         )
 
     def _compute(self) -> None:
-        forces: Array = np.zeros(3)
+        plant, forces = self._plant, np.zeros(3)
         for own in self._commands:
-            before, own.late = own.late, self._plant.tick - own.answers >= self._timeouts[own.side]
-            reaction = self._running.reactions[own.side]
+            seconds, reaction = self._running.timeouts[own.side], self._running.reactions[own.side]
+            before, age = own.late, plant.tick - own.answers
+            own.late = age >= max(1, math.ceil(seconds * NANOSECONDS / plant.scene.period_ns))
             if own.late and not before:
-                self._plant.count("timeouts")
-                words = (f"{own.side}: no command newer than {self._running.timeouts[own.side]:g} s at tick"
-                         f" {self._plant.tick}; reaction: {reaction}")
-                (self._plant.fail if reaction == "stop" else self._plant.get_logger().warning)(words)
+                plant.count("timeouts")
+                words = f"{own.side}: no command newer than {seconds:g} s at tick {plant.tick}; reaction: {reaction}"
+                (plant.fail if reaction == "stop" else plant.get_logger().warning)(words)
             forces[own.body] = 0.0 if own.late and reaction == "zero" else own.force
-            self._timing.age(own.side, self._plant.tick - own.answers, own.late)
-        if self._plant.finished:
+            self._timing.age(own.side, age, own.late)
+        if plant.finished:
             return
-        if self._plant.tick + 1 == self._plant.scene.ticks:
+        if plant.tick + 1 == plant.scene.ticks:
             self.report()
-            self._plant.flush(self._quality)  # before the last state, with which a monitor closes its bag
-        self._plant.step(forces)
+            plant.flush(self._quality)  # before the last state, with which a monitor closes its bag
+        plant.step(forces)
 
     def report(self) -> None:
         """Publish the quality of the last second; say whose commands are missing."""
