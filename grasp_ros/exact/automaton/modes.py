@@ -157,8 +157,7 @@ def end_begin(state: State, side: Body, out: Output) -> None:
 @inlined
 def end_motion(state: State, side: Body) -> None:
     """Put a pair at u = u' = 0 whose motion has died out: squares of it would have left the range of numbers."""
-    u, d = state.y[U.L + side], approach(state.y, side)
-    if max(abs(u), abs(d)) < DIED_OUT and (u != 0.0 or d != 0.0):
+    if abs(state.y[U.L + side]) < DIED_OUT and abs(approach(state.y, side)) < DIED_OUT:
         keep_together(state, side)
 
 
