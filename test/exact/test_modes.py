@@ -591,7 +591,7 @@ def test_a_pair_whose_motion_has_died_out_rests(side: Body, mode: Pair, u: float
     before = b.state.y.copy()
     settle_pairs(b.plant, b.state, b.settings, b.out)
     assert b.mode(side) is (Pair.RESTING if dead else mode)
-    assert is_resting(b.state.y, side) is dead
+    assert bool(is_resting(b.state.y, side)) is dead
     assert dead or b.state.y.tobytes() == before.tobytes()
 
 
