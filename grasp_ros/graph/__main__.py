@@ -17,7 +17,7 @@ from itertools import chain, pairwise
 from typing import Any
 
 from grasp_ros.graph.host import check_reach, environment, remove_left
-from grasp_ros.graph.parameters import NODES, PARAMETERS, usage
+from grasp_ros.graph.parameters import NODES, PARAMETERS, TOOLS, usage
 from grasp_ros.graph.stopping import STOP_SIGNALS, end_late_by_force, end_with_parent, note_signals
 from grasp_ros.physics.errors import Refused, needing
 
@@ -59,7 +59,8 @@ def main(name: str, child: bool = False) -> int:
 def _maker(name: str) -> Callable[..., Any]:
     """What makes the node of that name: its class, that of `monitor` is `nodes.monitor.Monitor`."""
     kind = "controller" if name.endswith("controller") else name
-    make: Callable[..., Any] = getattr(import_module(f"grasp_ros.graph.nodes.{kind}"), kind.capitalize())
+    module = import_module(f"grasp_ros.graph.{'tools' if name in TOOLS else 'nodes'}.{kind}")
+    make: Callable[..., Any] = getattr(module, kind.capitalize())
     return partial(make, name) if kind == "controller" else make
 
 

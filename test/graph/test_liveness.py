@@ -34,11 +34,11 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from grasp_ros.graph import bag
+from grasp_ros.graph.health.heartbeat import Heartbeat, Heartbeats, digest
+from grasp_ros.graph.health.peers import Need
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.heartbeat import Heartbeat, Heartbeats, digest
 from grasp_ros.graph.ros.node import NEW, GraspNode
-from grasp_ros.graph.ros.peers import Need
 from grasp_ros.scene.topics import JOINT_STATES
 from grasp_ros.scene.topics import RUN as RUNNING
 

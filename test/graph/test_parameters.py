@@ -29,11 +29,11 @@ from sensor_msgs.msg import JointState
 from grasp_ros import scene
 from grasp_ros.graph import __main__, bag
 from grasp_ros.graph.bag.verify import laws_of, verify
+from grasp_ros.graph.lockstep.synchronizer import Tick
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.nodes.lyapunov_monitor import LyapunovMonitor
 from grasp_ros.graph.nodes.monitor import Monitor
 from grasp_ros.graph.nodes.plant import Plant
-from grasp_ros.graph.nodes.synchronizer import Tick
 from grasp_ros.graph.parameters import FREE, NODES
 from grasp_ros.graph.ros.messages import State
 from grasp_ros.graph.serialization import list_message

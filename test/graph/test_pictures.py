@@ -24,10 +24,10 @@ from visualization_msgs.msg import Marker, MarkerArray
 from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.nodes.picture import TOUCHING, markers
-from grasp_ros.graph.nodes.watch import HINT
 from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.terminal import SIGNS, Moment, View
+from grasp_ros.graph.tools.watch import HINT
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.topics import CONTACTS, FRAME, LYAPUNOV_NAMES, ROBOT_DESCRIPTION

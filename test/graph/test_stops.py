@@ -118,7 +118,7 @@ def test_lonely_nodes_end_cleanly_on_a_signal(launch: Any, tmp_path: Path, numbe
 WRONG_PLANT = """
 import sys
 from grasp_ros.graph import __main__ as start
-from grasp_ros.graph.ros import peers
+from grasp_ros.graph.health import peers
 from grasp_ros.simulation.sampled_plant import SampledPlant
 step = SampledPlant.step
 def push_harder(plant, commands):

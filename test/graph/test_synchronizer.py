@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
 
-from grasp_ros.graph.nodes.synchronizer import (
+from grasp_ros.graph.lockstep.synchronizer import (
     GIVE_UP_SECONDS,
     PATIENCE_TICKS,
     UNCERTAIN_SECONDS,

@@ -10,10 +10,10 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 
 from grasp_ros import scene as scenes
+from grasp_ros.graph.health.peers import PeerNode
 from grasp_ros.graph.parameters import Running
 from grasp_ros.graph.ros.messages import UNREADABLE, State, StateReader
 from grasp_ros.graph.ros.node import Phase
-from grasp_ros.graph.ros.peers import PeerNode
 from grasp_ros.graph.serialization import list_message, template_of
 from grasp_ros.physics.control import FIXED, Column, command_of, limited
 from grasp_ros.physics.errors import Failed, Refused, described

@@ -9,7 +9,7 @@ import numpy as np
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
-from grasp_ros.graph.nodes.synchronizer import Tick
+from grasp_ros.graph.lockstep.synchronizer import Tick
 from grasp_ros.graph.serialization import raw_force, raw_stamp_ns
 from grasp_ros.physics.control import is_due
 from grasp_ros.physics.energy import energy, energy_balance

@@ -17,14 +17,14 @@ from grasp_ros import scene as scenes
 from grasp_ros.graph.bag import BagError
 from grasp_ros.graph.bag.recorder import NOT_RECORDED, Recorder, check_path
 from grasp_ros.graph.bag.rosbag2 import topics_of
-from grasp_ros.graph.nodes.loop import Commands
+from grasp_ros.graph.health.heartbeat import digest
+from grasp_ros.graph.health.peers import PeerNode
+from grasp_ros.graph.lockstep.loop import Commands
+from grasp_ros.graph.lockstep.synchronizer import ARMS, GIVE_UP_SECONDS, UNCERTAIN_SECONDS, Arrival, Synchronizer, Tick
 from grasp_ros.graph.nodes.lyapunov_monitor import MOST_BYTES, LyapunovMonitor
 from grasp_ros.graph.nodes.picture import Picture
-from grasp_ros.graph.nodes.synchronizer import ARMS, GIVE_UP_SECONDS, UNCERTAIN_SECONDS, Arrival, Synchronizer, Tick
 from grasp_ros.graph.parameters import Running
-from grasp_ros.graph.ros.heartbeat import digest
 from grasp_ros.graph.ros.messages import UNREADABLE
-from grasp_ros.graph.ros.peers import PeerNode
 from grasp_ros.graph.serialization import raw_command, template_of
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene, topics

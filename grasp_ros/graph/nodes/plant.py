@@ -17,12 +17,12 @@ from std_msgs.msg import String
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status, compile_kernels
-from grasp_ros.graph.nodes.free_running import FreeRunning
-from grasp_ros.graph.nodes.lockstep import Lockstep
+from grasp_ros.graph.health.heartbeat import digest
+from grasp_ros.graph.health.peers import SLOW, Need, PeerNode
+from grasp_ros.graph.lockstep.free_running import FreeRunning
+from grasp_ros.graph.lockstep.lockstep import Lockstep
 from grasp_ros.graph.parameters import Running, check_factor
-from grasp_ros.graph.ros.heartbeat import digest
 from grasp_ros.graph.ros.node import Phase
-from grasp_ros.graph.ros.peers import SLOW, Need, PeerNode
 from grasp_ros.graph.serialization import SHORTEST, raw_stamp_ns, template_of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from grasp_ros.graph.nodes.loop import Commands, Loop
+from grasp_ros.graph.health.peers import Need
+from grasp_ros.graph.lockstep.loop import Commands, Loop
 from grasp_ros.graph.parameters import Running
-from grasp_ros.graph.ros.peers import Need
 from grasp_ros.graph.serialization import list_message, raw_command
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.topics import LYAPUNOV, TIMING, timing_names

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, NamedTuple
 
+from grasp_ros.graph.health.heartbeat import ENDED, Heartbeat, Heartbeats, Watchdog, digest
 from grasp_ros.graph.parameters import check_timeouts
-from grasp_ros.graph.ros.heartbeat import ENDED, Heartbeat, Heartbeats, Watchdog, digest
 from grasp_ros.graph.ros.node import ACKNOWLEDGE_SECONDS, NEW, PATIENCE_SECONDS, GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import TEXT_BYTES

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from grasp_ros.graph.nodes.loop import Commands, Loop
+from grasp_ros.graph.health.peers import Need
+from grasp_ros.graph.lockstep.loop import Commands, Loop
 from grasp_ros.graph.ros.node import NEW
-from grasp_ros.graph.ros.peers import Need
 from grasp_ros.graph.serialization import raw_command
 from grasp_ros.scene.topics import LYAPUNOV, WINDOW, Topic
 

@@ -21,7 +21,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from grasp_ros import scene as scenes
-from grasp_ros.graph.nodes.loop import PAUSED
+from grasp_ros.graph.lockstep.loop import PAUSED
 from grasp_ros.graph.parameters import Running
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase

@@ -1,0 +1,1 @@
+"""Who is there, who is silent, and who has ended."""

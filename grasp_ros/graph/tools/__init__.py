@@ -1,0 +1,1 @@
+"""What a user watches, steers and plays with."""
