@@ -28,11 +28,11 @@ from sensor_msgs.msg import JointState
 from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.verify import verify
+from grasp_ros.graph.health import heartbeat
 from grasp_ros.graph.health.peers import PeerNode
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.nodes.monitor import Monitor
 from grasp_ros.graph.nodes.plant import Plant
-from grasp_ros.graph.health import heartbeat
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.serialization import force_message
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, WINDOW

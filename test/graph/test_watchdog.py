@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from grasp_ros.graph.health.heartbeat import EVERY_SECONDS, HEARTBEAT_SECONDS, Watchdog
 from grasp_ros.graph.health import heartbeat
+from grasp_ros.graph.health.heartbeat import EVERY_SECONDS, HEARTBEAT_SECONDS, Watchdog
 
 PATIENCE, LAW_PATIENCE = 2.1, 60.0
 
