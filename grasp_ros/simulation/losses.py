@@ -13,7 +13,7 @@ import numpy as np
 
 from grasp_ros.physics.energy import pairs_of
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Of
-from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
+from grasp_ros.physics.model import Array, hertzian_force, impact_force
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.simulation.repeat import as_row, at_every_tick
 from grasp_ros.simulation.trajectory import Trajectory, check_run
@@ -39,8 +39,7 @@ def power_lost(system: System, state: Array) -> Losses:
     speed[:, system.present] = state[:, [COLUMN[body] + 1 for body in system.present]]
     damping, loop = system.bodies[:, Of.DAMPING], system.closed_loop[:, Of.DAMPING]
     arms, impacts = speed[:, :OBJECT] ** 2, np.zeros(len(state))
-    for side, u, d in pairs_of(system, state):
-        contact = Contact(*system.pairs[side])
+    for _, contact, u, d in pairs_of(system, state):
         impacts += (impact_force(contact, u, d) - hertzian_force(contact, u)) * d
     friction = damping[OBJECT] * speed[:, OBJECT] ** 2 + system.coulomb * np.abs(speed[:, OBJECT])
     return Losses(arms @ damping[:OBJECT], arms @ (loop - damping)[:OBJECT], impacts, friction)

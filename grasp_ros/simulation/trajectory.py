@@ -21,7 +21,7 @@ from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.given import instance, number, times
 from grasp_ros.physics.layout import LEFT, RIGHT, Body, Entry, Transition
 from grasp_ros.physics.lyapunov import Parts, largest_deformation, parts
-from grasp_ros.physics.model import Array, Contact, impact_force
+from grasp_ros.physics.model import Array, impact_force
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.files import opened
@@ -160,8 +160,8 @@ class Trajectory(Motion, Frozen):
     def impacts(self) -> Array:
         """Impact forces fw_l, fw_r (n, 2) at the output times in N; 0 where there is no contact, or none at all."""
         forces = np.zeros((len(self.t), 2))
-        for side, u, d in pairs_of(self.scene.system, self.state):
-            forces[:, side] = impact_force(Contact(*self.scene.system.pairs[side]), u, d)
+        for side, contact, u, d in pairs_of(self.scene.system, self.state):
+            forces[:, side] = impact_force(contact, u, d)
         return forces
 
     def at(self, t: ArrayLike) -> Array:
