@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from grasp_ros import scene as scenes
-from grasp_ros.cli.commands import COMMANDS
-from grasp_ros.cli.parser import Command, add_levels
+from grasp_ros.cli.parser import COMMANDS, Command, add_levels
 from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
 from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused

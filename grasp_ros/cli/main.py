@@ -21,8 +21,7 @@ from contextlib import suppress
 from importlib import import_module
 
 import grasp_ros
-from grasp_ros.cli.commands import COMMANDS, overview
-from grasp_ros.cli.parser import Command, Parser, add_levels, shortened
+from grasp_ros.cli.parser import COMMANDS, Command, Parser, add_levels, overview, shortened
 from grasp_ros.graph.bag.disk import FULL
 from grasp_ros.graph.stopping import is_signalled, on_signals, raise_on_signals
 from grasp_ros.physics.errors import Refused, described, needing

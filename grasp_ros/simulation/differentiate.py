@@ -107,13 +107,11 @@ def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
 
 def complete(scene: Scene, integrator: Integrator, sampled: bool, times: Array) -> Array:
     """Run a scene to its end, as `simulate` does, or refuse; states (m, 6) at output times (m,) in s, in any order."""
-    order = np.argsort(times, kind="stable")
-    ascending = drive(scene, integrator, sampled, times[order])
+    grid, index = np.unique(times, return_inverse=True)
+    states = drive(scene, integrator, sampled, grid)
     if integrator.status is not Status.DONE:
         raise Refused(f"{scene.name}: no derivatives of a run that {integrator.stop}")
-    states = np.empty_like(ascending)
-    states[order] = ascending
-    return states
+    return states[index]
 
 
 def level_rates(system: System, changes: Directions, state: Array, rates: Array) -> Array:

@@ -16,7 +16,7 @@ import yaml
 from processes import GRASP, ran
 
 from grasp_ros import scene, simulation
-from grasp_ros.cli.commands import COMMANDS
+from grasp_ros.cli.parser import COMMANDS
 
 SHORT = ("--set", "time.duration_s=1")
 
