@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_file, add_json, add_scene, named, whole
-from grasp_ros.cli.checks import check_output, load_scene, prepare
-from grasp_ros.cli.output import bar, figure_endings, show, write_figure, write_text
+from grasp_ros.cli.common import bar, check_output, figure_endings, load_scene, prepare, show, write_figure, write_text
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import YAML
 from grasp_ros.simulation.outcomes import GROUPS

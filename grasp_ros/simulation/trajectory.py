@@ -24,8 +24,7 @@ from grasp_ros.physics.lyapunov import Parts, largest_deformation, parts
 from grasp_ros.physics.model import Array, impact_force
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.files import opened
-from grasp_ros.scene.npz import signed
+from grasp_ros.scene.files import opened, signed
 from grasp_ros.simulation.contacts import check_located, contact_table, side_of
 from grasp_ros.simulation.repeat import breaks_of, states_at
 from grasp_ros.simulation.sampled_plant import LoopRecord, tick_of

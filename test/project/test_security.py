@@ -29,7 +29,7 @@ from grasp_ros.graph.parameters import PEER_SECONDS
 from grasp_ros.graph.running import Running
 from grasp_ros.maps import store
 from grasp_ros.physics.errors import Refused
-from grasp_ros.scene.npz import signed
+from grasp_ros.scene.files import signed
 from grasp_ros.scene.scene import Scene
 from grasp_ros.simulation import simulate
 from lab.drills import recorder
