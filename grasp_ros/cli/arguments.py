@@ -73,11 +73,6 @@ def named(word: str) -> Path:
     return Path(word)
 
 
-def add_directory(sub: Options, text: str) -> None:
-    """A new directory to write."""
-    sub.add_argument("-o", "--output", type=named, metavar="DIRECTORY", help=text)
-
-
 def add_file(sub: Options, metavar: str, text: str) -> None:
     """A file to write, or - for the standard output, and whether one that is there may be replaced."""
     sub.add_argument("-o", "--output", type=Path, metavar=metavar, help=text)

@@ -11,10 +11,10 @@ import logging
 import math
 import os
 import sys
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -22,9 +22,6 @@ from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import format_of, replacing, writing
-
-if TYPE_CHECKING:
-    from grasp_ros.simulation.progress import Callback
 
 STDOUT = Path("-")
 ROW = 16  # numbers that a run keeps for each output time: time, state, commands, energies, and copies
@@ -100,7 +97,7 @@ def note(text: str) -> None:
         print(text, file=sys.stderr)
 
 
-def bar(total: float | None, unit: str, name: str) -> AbstractContextManager[Callback | None]:
+def bar(total: float | None, unit: str, name: str) -> AbstractContextManager[Callable[[Any], object] | None]:
     """A bar on a terminal, see `simulation.progress`; None where there is none."""
     from grasp_ros.simulation.progress import showing  # with the compiler, which a graph does not need
 

@@ -173,7 +173,7 @@ def test_what_is_written_under_a_name_in_capitals_is_read_under_it(command: Any)
 
 @pytest.mark.parametrize("name", scene.names())
 def test_a_new_scene_is_the_one_it_is_like_and_every_offer_can_be_taken(name: str) -> None:
-    from grasp_ros.scene.commented import commented
+    from grasp_ros.cli.scenes import commented
 
     like = scene.load(name)
     text = commented(like)
