@@ -29,7 +29,7 @@ from grasp_ros.scene.files import YAML, read_text, reading
 from grasp_ros.scene.strict_yaml import dump
 from grasp_ros.scene.strict_yaml import load as load_yaml
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, Topic
-from grasp_ros.scene.validation import KEYS, SceneError, apply_settings, check_domain, check_keys, read, read_sections
+from grasp_ros.scene.validation import TEXTS, SceneError, apply_settings, check_domain, check_keys, read, read_sections
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -247,7 +247,7 @@ def parse(text: str, name: str, source: str, settings: Sequence[str] = ()) -> Sc
     except Refused as error:
         raise SceneError(f"{source}: {error}") from None
     if not isinstance(document, dict):
-        raise SceneError(f"{source}: not a mapping; allowed: the keys {', '.join(KEYS)}")
+        raise SceneError(f"{source}: not a mapping; allowed: the keys {', '.join((*TEXTS, *BY_SECTION))}")
     before: Mapping[str, Any] | None = None
     if settings := given.names("settings", settings):
         with suppress(SceneError):  # what is wrong without settings may be right with them

@@ -14,7 +14,7 @@ from grasp_ros.scene.effects import BY_SECTION, named
 from grasp_ros.scene.effects.base import BODIES, Effect
 from grasp_ros.scene.strict_yaml import load
 
-KEYS = ("title", "readings", "watch", *BY_SECTION)  # of a file
+TEXTS = ("title", "readings", "watch")
 FEW = 2  # changes that a title names
 CHANGED = re.compile(r" \[(other numbers|\w+(\.\w+)?=[^\]]*)\]$")  # at the end of a title
 CONTROLS = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\ud800-\udfff]")  # categories Cc, without the line break, and Cs
@@ -46,7 +46,7 @@ def check_keys(source: str, prefix: str, found: Mapping[Any, Any], known: Sequen
 def read(source: str, document: Mapping[Any, Any], before: Mapping[str, Any] | None
          ) -> tuple[str, tuple[str, ...], str, dict[str, dict[str, Any]]]:
     """Title, readings, what to watch for and the numbers of a scene, perhaps one with the numbers `before`."""
-    check_keys(source, "", document, KEYS, ("title", "readings", "time"))
+    check_keys(source, "", document, (*TEXTS, *BY_SECTION), ("title", "readings", "time"))
     title, readings, watch = document["title"], document["readings"], document.get("watch", "")
     for key, value in (("title", title), ("watch", watch)):
         if not is_text(value):
