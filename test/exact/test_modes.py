@@ -30,7 +30,7 @@ from grasp_ros.exact.automaton.modes import (
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.kinematics import is_closed, is_resting, other
 from grasp_ros.exact.records import Candidate, Ends, Tables
-from grasp_ros.exact.tolerances import LEFT_OUT
+from grasp_ros.exact.tolerances import DIED_OUT, LEFT_OUT
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, Slide, Transition, U, V, X
 
 NEVER = Candidate(math.inf, Transition.TOUCH)
@@ -577,6 +577,22 @@ def test_one_pair_alone_does_not_leave_without_its_force(side: Body, beside_mode
     b = bench(side, 0.1 * depth(0.3), -0.3, Pair.CONTACT, beside=(0.1 * depth(0.3), -0.3), beside_mode=beside_mode)
     let_leave(b.plant, b.state, b.settings)
     assert (b.mode(side), b.mode(other(side))) == (Pair.CONTACT, beside_mode)
+
+
+@SIDES
+@pytest.mark.parametrize("mode", [Pair.OPEN, Pair.CONTACT])
+@pytest.mark.parametrize(("u", "d", "dead"), [
+    (0.5, -0.5, True), (0.5, 0.0, True), (0.0, 0.5, True), (-0.5, 0.0, True),
+    (1.5, 0.5, False), (0.5, 1.5, False), (-1.5, 0.5, False), (0.5, -1.5, False),
+])
+def test_a_pair_whose_motion_has_died_out_rests(side: Body, mode: Pair, u: float, d: float, dead: bool) -> None:
+    """u and u' are parts of what they may be."""
+    b = bench(side, DIED_OUT * u, DIED_OUT * d, mode)
+    before = b.state.y.copy()
+    settle_pairs(b.plant, b.state, b.settings, b.out)
+    assert b.mode(side) is (Pair.RESTING if dead else mode)
+    assert bool(is_resting(b.state.y, side)) is dead
+    assert dead or b.state.y.tobytes() == before.tobytes()
 
 
 @SIDES

@@ -9,7 +9,7 @@ import pytest
 from documents import body, horizon, made
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.integrator import Integrator
+from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.tolerances import REST
 from grasp_ros.physics.layout import Transition
 from grasp_ros.simulation import simulate
@@ -95,6 +95,19 @@ def test_held_commands_that_may_change_do_not_rest() -> None:
         assert (simulate(measured).at_rest is not None) == rests
     user = {"left": lambda tick, time, x, v: 0.0}
     assert simulate(horizon("preload", 100.0), controllers=user).at_rest is None
+
+
+@pytest.mark.parametrize("hertzian", [1e-3, 1e6])
+def test_an_arm_that_dies_out_in_contact_beside_one_that_swings_rests(hertzian: float) -> None:
+    """Its swing falls to 1e-222 m in 30 ms: squares of it leave the range of numbers."""
+    run = simulate(made(
+        0.26, 0.01, object=body(0.35), object_friction={"coulomb_N": 7e4},
+        left_arm=body(1e9, x=-1.0, stiffness_N_per_m=1e12),
+        right_arm=body(500.0, x=1e-4, v=1.5, stiffness_N_per_m=1e12, damping_Ns_per_m=1.6e7),
+        right_contact={"hertz_N_per_m1_5": hertzian, "dissipation_s_per_m": 0.016}))
+    assert run.status is Status.DONE
+    assert run.state[-1, 4:].tolist() == [0.0, 0.0]
+    assert run.at_rest is None
 
 
 def test_another_input_wakes_what_rests() -> None:

@@ -9,12 +9,12 @@ from __future__ import annotations
 from grasp_ros.exact.automaton.begin import is_negligible, must_begin
 from grasp_ros.exact.automaton.edge import NEVER, deciding_derivative, glides, has_glided, separates, surface_side
 from grasp_ros.exact.automaton.friction import apply_friction, lift_friction, push_on_object
-from grasp_ros.exact.compensated import copy, meet, put, velocity_lane
+from grasp_ros.exact.compensated import copy, keep_together, meet, put, velocity_lane
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.driver.outputs import record
 from grasp_ros.exact.kinematics import approach, is_closed, is_resting, other
 from grasp_ros.exact.records import Ends, Output, Plant, Settings, State
-from grasp_ros.exact.tolerances import LEFT_OUT, SLIPS, SURFACE, SURFACE_DRIFT, TOGETHER
+from grasp_ros.exact.tolerances import DIED_OUT, LEFT_OUT, SLIPS, SURFACE, SURFACE_DRIFT, TOGETHER
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Law, Pair, Slide, Transition, U, V
 
 
@@ -155,8 +155,17 @@ def end_begin(state: State, side: Body, out: Output) -> None:
 
 
 @inlined
+def end_motion(state: State, side: Body) -> None:
+    """Put a pair at u = u' = 0 whose motion has died out: squares of it would have left the range of numbers."""
+    if abs(state.y[U.L + side]) < DIED_OUT and abs(approach(state.y, side)) < DIED_OUT:
+        keep_together(state, side)
+
+
+@inlined
 def settle_pairs(plant: Plant, state: State, settings: Settings, out: Output) -> None:
     """Modes of the pairs that are consistent with where a segment begins."""
+    end_motion(state, LEFT)
+    end_motion(state, RIGHT)
     settle_resting(plant, state, out)
     end_begin(state, LEFT, out)
     end_begin(state, RIGHT, out)
