@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -146,12 +146,25 @@ class SampledPlant:
         """
         commands = given.forces("commands", commands)
         times = NO_TIMES if offsets is None else given.ascending("offsets", offsets, self._period)
-        waits = len(self._waiting)
+        waits, loop = len(self._waiting), self._one
         self.effort = self._waiting[self.tick % waits].copy() if waits else commands
-        record = self._go(Outputs(times, np.array([0, len(times)])), commands[None])
-        if len(record.inputs):  # none where it had stopped before
-            self.inputs = record.inputs[0]
-        return record.states
+        loop.begins[0], loop.bounds[1], loop.answers[0] = self.time, len(times), commands
+        loop.cursor[:] = new_cursor(self.tick)
+        if self._system.external:
+            loop.external[:] = self._system.external_over(np.array([self.tick]))
+        states = self._integrator.run(loop, times)
+        self.tick += int(loop.cursor[Cursor.INTERVAL])
+        self.inputs = loop.inputs[0].copy()
+        return states
+
+    @cached_property
+    def _one(self) -> Loop:
+        """A period under commands from outside: a graph makes each of its steps with it."""
+        external = np.zeros((1, 3)) if self._system.external else BARE.external
+        return Loop(
+            np.array([self._period]), np.zeros(1), np.zeros(2, dtype=np.int64), new_cursor(),
+            np.zeros((1, 3)), external, np.zeros((1, 3)), waiting=self._waiting,
+        )
 
     def follow(self, answers: Array, outputs: Outputs | None = None) -> Array:
         """Advance by one control period for each row of answers that are known beforehand.
