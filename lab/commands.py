@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from grasp_ros.cli.arguments import add_command, add_scene, named, whole
-from grasp_ros.cli.common import load_scene, prepare
+from grasp_ros.cli.checks import load_scene, prepare
 from grasp_ros.physics.errors import Refused
 
 Options = argparse.Namespace

@@ -9,7 +9,8 @@ from typing import Any
 from grasp_ros.accuracy import measure
 from grasp_ros.accuracy.measure import DONE, SECONDS, Advice, Record, Truth, by_method, fastest
 from grasp_ros.cli.arguments import add_command, add_file, add_json, add_scene
-from grasp_ros.cli.common import bar, check_output, figure_endings, load_scene, prepare, show, write_figure
+from grasp_ros.cli.checks import check_output, load_scene, prepare
+from grasp_ros.cli.output import bar, figure_endings, show, write_figure
 from grasp_ros.methods.contract import UNITS
 from grasp_ros.physics.errors import Refused
 

@@ -10,7 +10,8 @@ from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 from grasp_ros.cli.arguments import add_command, add_file, add_json, named
-from grasp_ros.cli.common import check_output, destination, prepare, show, warn
+from grasp_ros.cli.checks import check_output, prepare, warn
+from grasp_ros.cli.output import destination, show
 from grasp_ros.physics.errors import Refused
 
 if TYPE_CHECKING:  # what is not asked for is not imported, which takes a while

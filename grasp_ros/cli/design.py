@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_file, add_json, add_scene, named, whole
-from grasp_ros.cli.common import bar, check_output, figure_endings, load_scene, prepare, show, write_figure, write_text
+from grasp_ros.cli.checks import check_output, load_scene, prepare
+from grasp_ros.cli.output import bar, figure_endings, show, write_figure, write_text
 from grasp_ros.cli.report import table
 from grasp_ros.maps.plan import read_axis
 from grasp_ros.optimization.search import Design, DesignProblem, front, read_bound, search

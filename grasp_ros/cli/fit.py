@@ -7,7 +7,8 @@ from typing import Any
 
 from grasp_ros import scene as scenes
 from grasp_ros.cli.arguments import add_command, add_file, add_json, add_settings, complete_scenes, named
-from grasp_ros.cli.common import check_output, figure_endings, load_scene, prepare, show, warn, write_figure, write_text
+from grasp_ros.cli.checks import check_output, load_scene, prepare, warn
+from grasp_ros.cli.output import figure_endings, show, write_figure, write_text
 from grasp_ros.identification.fit import fit
 from grasp_ros.identification.measured import CHANNELS, measured
 from grasp_ros.physics.errors import Refused, printable

@@ -17,7 +17,8 @@ from typing import Any
 
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_scene, named, sides_of
 from grasp_ros.cli.bags import add_limits, check_limits, keeps
-from grasp_ros.cli.common import has_notes, load_scene, prepare
+from grasp_ros.cli.checks import load_scene, prepare
+from grasp_ros.cli.output import has_notes
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
 from grasp_ros.graph.bag import BagError, EmptyBagError
 from grasp_ros.graph.host import check_reach, hold, network

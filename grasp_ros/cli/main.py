@@ -98,7 +98,7 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
         command: Command = options.command
         if isinstance(sys.stdout, io.TextIOWrapper):  # a title or a path that the terminal cannot show is no error
             sys.stdout.reconfigure(errors="backslashreplace")
-        from grasp_ros.cli.common import set_level  # with numpy, which a help does not need
+        from grasp_ros.cli.output import set_level  # with numpy, which a help does not need
 
         set_level(options)
         with needing("this"):

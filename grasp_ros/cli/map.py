@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_json, add_scene, whole
-from grasp_ros.cli.common import bar, check_fits, load_scene, note, prepare, show
+from grasp_ros.cli.checks import check_fits, load_scene, prepare
+from grasp_ros.cli.output import bar, note, show
 from grasp_ros.cli.parser import COMMANDS
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
 from grasp_ros.maps import store

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from grasp_ros.cli import common
 from grasp_ros.cli.arguments import add_command, add_file, add_settings
+from grasp_ros.cli.checks import check_memory, check_output, load_scene, prepare, warn
+from grasp_ros.cli.output import STDOUT, figure_endings, note, write_figure
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.errors import Refused
@@ -60,14 +61,13 @@ def _plot(options: argparse.Namespace) -> int:
         if not 0.0 <= span[0] < span[1]:
             raise Refused(f"--from {span[0]:g} --to {span[1]:g} is not allowed; allowed: ascending from 0 s on")
     output = options.output or _beside(options.sources[0], ".gif" if options.animate else ".png")
-    if options.animate and (len(options.sources) > 1 or output == common.STDOUT):
+    if options.animate and (len(options.sources) > 1 or output == STDOUT):
         raise Refused("--animate: allowed: one source, and a file")
     if options.panels and options.animate:
         raise Refused("--panel: allowed: without --animate")
     if options.speed != 1.0 and not options.animate:
         raise Refused("--speed: allowed: with --animate")
-    endings = FORMATS if options.animate else common.figure_endings(output)
-    common.check_output(output, endings, options.force, options.sources)
+    check_output(output, FORMATS if options.animate else figure_endings(output), options.force, options.sources)
     if options.step is not None and options.method == EXACT:
         raise Refused(f"--step: allowed: with another --method than {EXACT}")
     if options.sensitivity and (options.animate or len(options.sources) > 1):
@@ -80,14 +80,14 @@ def _plot(options: argparse.Namespace) -> int:
             raise Refused(f"--from {span[0]:g} --to {span[1]:g} is not allowed; allowed: within 0 to {end:g} s")
     if options.animate:
         animate(motions[0], output, speed=options.speed, span=span, width_mm=options.width)
-        common.note(f"written to {output}")
+        note(f"written to {output}")
         return 0
     panels = [plots.PANELS[name] for name in options.panels or plots.PANELS]
     if isinstance(motions[0], Trajectory) and (found := motions[0].sensitivity) is not None:
         panels += [plots.Panel(partial(_draw, found, j), "derivative, m per unit", 2)
                    for j in range(len(found.keys))]
     figure = plots.compose(motions, width_mm=options.width, span=span, panels=panels)
-    common.write_figure(figure, output)
+    write_figure(figure, output)
     return 0
 
 
@@ -106,14 +106,14 @@ def _motion(source: str, options: argparse.Namespace, span: Span) -> Motion:
                       " scenes")
     if recorded:
         motion: Motion = load(path) if ending == ".npz" else read(path)
-        common.warn(motion.scene)
+        warn(motion.scene)
         return motion
     if path.is_file() and ending not in YAML:
         raise Refused(f"{source}: no such scene; allowed: a scene, a bag (a directory, or .mcap), or a .npz file of"
                       " `grasp simulate`")
-    scene = common.load_scene(source, options.settings)
-    common.check_memory(scene, options.sampled)
-    common.prepare()
+    scene = load_scene(source, options.settings)
+    check_memory(scene, options.sampled)
+    prepare()
     grid = None
     if span is not None and not (options.sampled or scene.sampled):
         first, last = np.clip(sorted(span), 0.0, scene.duration).tolist()

@@ -9,7 +9,8 @@ from typing import Any
 
 from grasp_ros import scene as scenes
 from grasp_ros.cli.arguments import add_command, add_force, add_json, add_settings, complete_scenes
-from grasp_ros.cli.common import check_output, load_scene, show, write_text
+from grasp_ros.cli.checks import check_output, load_scene
+from grasp_ros.cli.output import show, write_text
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import EFFECTS
 from grasp_ros.scene.effects.base import Effect

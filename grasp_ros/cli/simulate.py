@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_file, add_json, add_scene, load_controllers, whole
-from grasp_ros.cli.common import bar, check_memory, check_output, destination, load_scene, prepare, show
+from grasp_ros.cli.checks import check_memory, check_output, load_scene, prepare
+from grasp_ros.cli.output import bar, destination, show
 from grasp_ros.cli.report import describe_sensitivity, describe_trajectory, last_rates, table
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
 from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, UNITS

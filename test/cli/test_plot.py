@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from grasp_ros import scene
-from grasp_ros.cli import common, plot
+from grasp_ros.cli import plot
 from grasp_ros.physics.layout import Entry
 from grasp_ros.physics.system import NAMES
 from grasp_ros.simulation import simulate
@@ -65,7 +65,7 @@ def test_panels_are_chosen(command: Any, tmp_path: Path) -> None:
 def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """What `grasp plot` would write."""
     found: list[Any] = []
-    monkeypatch.setattr(common, "write_figure", lambda figure, _: found.append(figure))
+    monkeypatch.setattr(plot, "write_figure", lambda figure, _: found.append(figure))
     return found
 
 

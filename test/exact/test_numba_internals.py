@@ -88,7 +88,7 @@ def test_whoever_waits_for_the_compiler_is_told_once_and_a_quiet_command_says_no
     """Also in Python and where only a part has been compiled, as by the first fit."""
     script = tmp_path / "doors.py"
     script.write_text(
-        "import sys\nfrom argparse import Namespace\nfrom grasp_ros.cli.common import set_level\n"
+        "import sys\nfrom argparse import Namespace\nfrom grasp_ros.cli.output import set_level\n"
         "from grasp_ros.exact.compilation import jit\n\n@jit.door\ndef once(x: float) -> float:\n    return x\n\n"
         "@jit.door\ndef twice(x: float) -> float:\n    return 2.0 * x\n\n"
         "set_level(Namespace(quiet=len(sys.argv) > 1))\nprint(twice(once(1.0)))\n"
