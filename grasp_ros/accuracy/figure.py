@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from grasp_ros.accuracy.compare import Advice, by_method
-from grasp_ros.accuracy.measure import Record, Truth
+from grasp_ros.accuracy.measure import Advice, Record, Truth, by_method
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Figure, colormaps

@@ -6,8 +6,8 @@ import argparse
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from grasp_ros.accuracy.compare import SECONDS, Advice, advise, by_method, check_wish, compare, fastest
-from grasp_ros.accuracy.measure import DONE, Record, Truth, finest, own_contenders
+from grasp_ros.accuracy import measure
+from grasp_ros.accuracy.measure import DONE, SECONDS, Advice, Record, Truth, by_method, fastest
 from grasp_ros.cli.arguments import add_command, add_file, add_json, add_scene
 from grasp_ros.cli.checks import check_output, load_scene, prepare
 from grasp_ros.cli.output import bar, figure_endings, show, write_figure
@@ -38,14 +38,14 @@ def _accuracy(options: argparse.Namespace) -> int:
     wished = options.error is not None or options.budget is not None
     if not wished:
         options.error = TARGETS[-1]
-    check_wish(options.error, options.budget)
+    measure.check_wish(options.error, options.budget)
     check_output(options.output, figure_endings(options.output), options.force, [options.scene])
-    contenders, others = own_contenders(scene)
+    contenders, others = measure.own_contenders(scene)
     prepare()
-    truth = finest(scene)
+    truth = measure.finest(scene)
     with bar(options.seconds, "s", scene.name) as progress:
-        records, late = compare(scene, contenders, truth, seconds=options.seconds, progress=progress)
-    advice = advise(records, options.error, options.budget)
+        records, late = measure.compare(scene, contenders, truth, seconds=options.seconds, progress=progress)
+    advice = measure.advise(records, options.error, options.budget)
     again = " ".join([options.scene, *(f"--set {setting}" for setting in options.settings)])
     more = [f"after {options.seconds:g} s not all settings were measured, --seconds allows more: {', '.join(late)}"]
     text = [*_table(truth, records), *(more if late else []), *_not_here(others),

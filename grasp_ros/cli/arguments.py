@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from grasp_ros import scene as scenes
-from grasp_ros.cli.commands import COMMANDS
-from grasp_ros.cli.parser import Command, add_levels
+from grasp_ros.cli.parser import COMMANDS, Command, add_levels
 from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
 from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused
@@ -72,11 +71,6 @@ def named(word: str) -> Path:
     if word in ("", "-"):
         raise argparse.ArgumentTypeError(f"{word!r} is not allowed; allowed: a name")
     return Path(word)
-
-
-def add_directory(sub: Options, text: str) -> None:
-    """A new directory to write."""
-    sub.add_argument("-o", "--output", type=named, metavar="DIRECTORY", help=text)
 
 
 def add_file(sub: Options, metavar: str, text: str) -> None:

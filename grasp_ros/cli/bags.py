@@ -9,7 +9,7 @@ import sys
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
-from grasp_ros.cli.arguments import add_command, add_directory, add_file, add_json, named
+from grasp_ros.cli.arguments import add_command, add_file, add_json, named
 from grasp_ros.cli.checks import check_output, prepare, warn
 from grasp_ros.cli.output import destination, show
 from grasp_ros.physics.errors import Refused
@@ -24,7 +24,8 @@ def add_to(commands: Any) -> None:
     """Add the subcommands."""
     sub = add_command(commands, "recover", _recover)
     sub.add_argument("bag", type=named, help="directory or file of a bag")
-    add_directory(sub, "new directory for the bag (default: BAG_recovered)")
+    sub.add_argument("-o", "--output", type=named, metavar="DIRECTORY",
+                     help="new directory for the bag (default: BAG_recovered)")
     sub = add_command(commands, "inspect", _inspect)
     sub.add_argument("bag", type=named, help="directory or file of a bag")
     add_json(sub)

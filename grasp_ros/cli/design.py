@@ -11,8 +11,12 @@ import numpy as np
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_file, add_json, add_scene, named, whole
 from grasp_ros.cli.checks import check_output, load_scene, prepare
 from grasp_ros.cli.output import bar, figure_endings, show, write_figure, write_text
+from grasp_ros.cli.report import table
+from grasp_ros.maps.plan import read_axis
+from grasp_ros.optimization.search import Design, DesignProblem, front, read_bound, search
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import YAML
+from grasp_ros.simulation.chunk import Setup
 from grasp_ros.simulation.outcomes import GROUPS
 
 END = "  an end of its range: a wider one may have a better choice"
@@ -44,10 +48,6 @@ def add_to(commands: Any) -> None:
 
 
 def _design(options: argparse.Namespace) -> int:
-    from grasp_ros.maps.plan import read_axis
-    from grasp_ros.optimization.search import Design, DesignProblem, front, read_bound, search
-    from grasp_ros.simulation.chunk import Setup
-
     scene = load_scene(options.scene, options.settings)
     setup = Setup(accuracy=options.accuracy, sampled=options.sampled)
     problem = DesignProblem(scene, [read_axis("--free", text, grid=False) for text in options.free], options.minimise,
@@ -74,10 +74,8 @@ def _design(options: argparse.Namespace) -> int:
     return 0
 
 
-def _table(problem: Any, found: Sequence[Any]) -> list[str]:
+def _table(problem: DesignProblem, found: Sequence[Design]) -> list[str]:
     """A column for each free number and outcome, a row for each choice; of one choice a line for each of them."""
-    from grasp_ros.cli.report import table
-
     units = {name: "" if unit == "1" else f" {unit}" for name, unit in problem.units.items()}
     if len(found) == 1:
         numbers = found[0].numbers
@@ -96,7 +94,7 @@ def _table(problem: Any, found: Sequence[Any]) -> list[str]:
     return ["  ".join(f"{cell:>{width}}" for cell, width in zip(line, widths, strict=True)) for line in [heads, *lines]]
 
 
-def _without_effect(problem: Any, choice: Any) -> list[str]:
+def _without_effect(problem: DesignProblem, choice: Design) -> list[str]:
     """Free numbers that the outcome does not depend on, with the others as they were chosen."""
     keys: list[str] = []
     name = problem.minimise[0]

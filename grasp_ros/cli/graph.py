@@ -15,7 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from grasp_ros.cli.arguments import add_accuracy, add_command, add_directory, add_scene, named, sides_of
+from grasp_ros.cli.arguments import add_accuracy, add_command, add_scene, named, sides_of
 from grasp_ros.cli.bags import add_limits, check_limits, keeps
 from grasp_ros.cli.checks import load_scene, prepare
 from grasp_ros.cli.output import has_notes
@@ -34,7 +34,7 @@ def add_to(commands: Any) -> None:
     sub = add_command(commands, "run", _run)
     add_scene(sub)
     add_accuracy(sub)
-    add_directory(sub, "new directory for the scene and the bag")
+    sub.add_argument("-o", "--output", type=named, metavar="DIRECTORY", help="new directory for the scene and the bag")
     sub.add_argument(
         "--without", action="append", default=[], metavar="CONTROLLER",
         help="do not start left_controller or right_controller; wait for another one on its topic",

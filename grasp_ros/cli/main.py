@@ -21,8 +21,7 @@ from contextlib import suppress
 from importlib import import_module
 
 import grasp_ros
-from grasp_ros.cli.commands import COMMANDS, overview
-from grasp_ros.cli.parser import Command, Parser, add_levels, shortened
+from grasp_ros.cli.parser import COMMANDS, Command, Parser, add_levels, overview, shortened
 from grasp_ros.graph.bag.disk import FULL
 from grasp_ros.graph.stopping import is_signalled, on_signals, raise_on_signals
 from grasp_ros.physics.errors import Refused, described, needing
@@ -105,7 +104,11 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
         with needing("this"):
             status = command(options)
         if getattr(options, "verbose", False):
-            _say_more(time.monotonic() - begin)
+            from grasp_ros.exact.compilation.kernel_cache import cache_directory
+            from grasp_ros.scene.versions import versions
+
+            print(", ".join(f"{name} {version}" for name, version in versions().items()), file=sys.stderr)
+            print(f"kernels: {cache_directory()}\n{time.monotonic() - begin:.3f} s", file=sys.stderr)
         return status
     except Refused as error:
         print(shortened(f"grasp: {error}"), file=sys.stderr)
@@ -138,15 +141,6 @@ def _complete() -> None:
     line = os.environ.get("COMP_LINE", "")[: int(os.environ.get("COMP_POINT", "0"))].split(" ")
     words = line[1:-1]  # the last one is not complete yet
     argcomplete.autocomplete(_parser(words))
-
-
-def _say_more(seconds: float) -> None:
-    """What `-v` adds."""
-    from grasp_ros.exact.compilation.kernel_cache import cache_directory
-    from grasp_ros.scene.versions import versions
-
-    print(", ".join(f"{name} {version}" for name, version in versions().items()), file=sys.stderr)
-    print(f"kernels: {cache_directory()}\n{seconds:.3f} s", file=sys.stderr)
 
 
 class _Version(argparse.Action):

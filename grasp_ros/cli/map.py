@@ -6,23 +6,23 @@ import argparse
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_json, add_scene, whole
 from grasp_ros.cli.checks import check_fits, load_scene, prepare
-from grasp_ros.cli.commands import COMMANDS
 from grasp_ros.cli.output import bar, note, show
+from grasp_ros.cli.parser import COMMANDS
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
+from grasp_ros.maps import store
+from grasp_ros.maps.plan import Plan, read_axis
+from grasp_ros.maps.run import run
 from grasp_ros.observe.record import Wanted
 from grasp_ros.physics.errors import Refused, need
 from grasp_ros.scene.files import format_of
 from grasp_ros.simulation.chunk import HORIZONS, SETTLED, STATUSES, Setup, compute
 from grasp_ros.simulation.outcomes import GROUPS, find
-
-if TYPE_CHECKING:
-    from grasp_ros.maps.plan import Plan
 
 RANGE = "KEY[+KEY]=low:high[:n[:log]]"
 
@@ -58,9 +58,7 @@ def add_to(commands: Any) -> None:
 
 def _map(options: argparse.Namespace) -> int:
     need("`grasp map`", "xarray", "zarr", *["scipy"] * bool(options.sample))
-    from grasp_ros.maps import figures, store
-    from grasp_ros.maps.plan import Plan, read_axis
-    from grasp_ros.maps.run import run
+    from grasp_ros.maps import figures  # with matplotlib
 
     scene = load_scene(options.scene, options.settings)
     format_of(options.output, [".zarr"])
@@ -108,8 +106,6 @@ DONE = STATUSES.index(Status.DONE.name)
 
 def data_of(data: Any) -> dict[str, Any]:
     """Of each outcome its quantiles but for nan, its unit, how many are infinite or nan; and how the runs ended."""
-    from grasp_ros.maps import store
-
     found: dict[str, Any] = {}
     for name in store.columns_of(data):
         values = data[name].values.ravel()

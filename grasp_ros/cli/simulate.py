@@ -12,12 +12,13 @@ import numpy as np
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_file, add_json, add_scene, load_controllers, whole
 from grasp_ros.cli.checks import check_memory, check_output, load_scene, prepare
 from grasp_ros.cli.output import bar, destination, show
+from grasp_ros.cli.report import describe_sensitivity, describe_trajectory, last_rates, table
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
 from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, UNITS
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
-from grasp_ros.simulation import GRID_POINTS, simulate
+from grasp_ros.simulation import GRID_POINTS, simulate, summary
 from grasp_ros.simulation.sampled_plant import tick_times
 
 
@@ -63,9 +64,6 @@ def _methods(options: argparse.Namespace) -> int:
 
 
 def _simulate(options: argparse.Namespace) -> int:
-    from grasp_ros.cli.report import describe_sensitivity, describe_trajectory, last_rates, table
-    from grasp_ros.simulation.quantities import summary
-
     scene = load_scene(options.scene, options.settings)
     knob = METHODS[options.method].knob
     given = {STEP: options.step, TOLERANCE: options.tolerance, ACCURACY_KNOB: options.accuracy}

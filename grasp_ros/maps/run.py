@@ -12,9 +12,9 @@ import os
 import signal
 import time
 from collections.abc import Callable, Generator, Iterable
+from concurrent.futures import CancelledError
 from contextlib import closing, nullcontext
 from functools import cache, partial
-from itertools import islice
 from multiprocessing.resource_tracker import ensure_running
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ from grasp_ros.maps.store import Store
 from grasp_ros.physics.errors import Refused, need
 from grasp_ros.scene.versions import versions
 from grasp_ros.simulation.chunk import NEVER, Chunk, compute
-from grasp_ros.simulation.ensemble import Span, chunk_rows, in_threads
+from grasp_ros.simulation.ensemble import Span, chunk_rows, each_done, in_threads
 
 AHEAD = 3  # chunks for each worker that are handed out
 TIMEOUT_S = 10
@@ -112,19 +112,11 @@ def connect(workers: int, scheduler: str) -> Any:
 
 def on_cluster(client: Any, plan: Plan, spans: Iterable[Span]) -> Generator[tuple[Span, Chunk], None, None]:
     """Do chunks on a cluster, and hand each over when it is done."""
-    from distributed import CancelledError, KilledWorker, as_completed
+    from distributed import KilledWorker
 
-    document, own = json.dumps(plan.to_document()), versions()
-    following = iter(spans)
-
-    def submit(count: int) -> list[Any]:
-        return [(client.submit(work, document, span, pure=False), span) for span in islice(following, count)]
-
-    threads = max(sum(client.nthreads().values()), 1)
-    waiting: dict[Any, Span] = dict(submit(AHEAD * threads))
-    completed = as_completed(list(waiting))
-    for future in completed:
-        span = waiting.pop(future)
+    document, own, cluster = json.dumps(plan.to_document()), versions(), client.get_executor(pure=False)
+    most = AHEAD * max(sum(client.nthreads().values()), 1)
+    for span, future in each_done(lambda span: cluster.submit(work, document, span), spans, most):
         try:
             found, chunk = future.result()
         except (KilledWorker, CancelledError) as error:
@@ -133,7 +125,4 @@ def on_cluster(client: Any, plan: Plan, spans: Iterable[Span]) -> Generator[tupl
         if found != own:
             other = ", ".join(f"{name} {version}" for name, version in found.items() if own.get(name) != version)
             raise Refused(f"a worker has {other}; allowed: the versions of this process, because the bits may differ")
-        for added, following_span in submit(1):
-            waiting[added] = following_span
-            completed.add(added)
         yield span, chunk

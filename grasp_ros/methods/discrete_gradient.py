@@ -26,7 +26,7 @@ from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.impact import energy_quotient
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.contract import Problem, Solution
-from grasp_ros.methods.equations import SLIVER, Work, in_pieces, parameters
+from grasp_ros.methods.equations import SLIVER, Work, begun, in_pieces
 from grasp_ros.physics.layout import EPS, Outcome
 
 MOST_ITERATIONS = 100
@@ -34,8 +34,7 @@ MOST_ITERATIONS = 100
 
 def solve(problem: Problem) -> Solution:
     """Integrate with a fixed step; outputs between the steps by the parabola that the method follows."""
-    q, y = parameters(problem.system), tuple(problem.system.state.tolist())
-    out, work = np.empty((len(problem.grid), 6)), np.zeros(len(Work), dtype=np.int64)
+    q, y, out, work = begun(problem)
     outcome, (_, _, _, rows) = in_pieces(problem, (0.0, y, 0, 0), lambda reached, last: run(
         q, problem.duration, problem.setting, problem.grid, out, work, reached, last))
     return Solution(out[:rows], np.empty((0, 5)), work, Status[Outcome(outcome).name])

@@ -39,6 +39,12 @@ def parameters(system: System) -> Array:
     return np.concatenate([*sides, bodies[OBJECT, [Of.MASS]]])
 
 
+def begun(problem: Problem) -> tuple[Array, Any, Array, Any]:
+    """What a run with a fixed step begins with: parameters, state, room for the output states, and counters at 0."""
+    state, out = problem.system.state.tolist(), np.empty((len(problem.grid), 6))
+    return parameters(problem.system), tuple(state), out, np.zeros(len(Work), dtype=np.int64)
+
+
 def in_pieces(problem: Problem, begin: Any, run: Callable[[Any, int], tuple[int, Any]]) -> tuple[int, Any]:
     """The outcome of a run with a fixed step, and what it reached: some steps at a time, to say how far it is.
 

@@ -28,17 +28,7 @@ from grasp_ros.exact.compilation.jit import allocating, kernel
 from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.contract import Problem, Solution
-from grasp_ros.methods.equations import (
-    MAX_IDLE,
-    SLIVER,
-    Work,
-    condition,
-    in_pieces,
-    kind_of,
-    parameters,
-    rates,
-    relative,
-)
+from grasp_ros.methods.equations import MAX_IDLE, SLIVER, Work, begun, condition, in_pieces, kind_of, rates, relative
 from grasp_ros.physics.layout import EPS, LEFT, RIGHT, Body, Outcome, Pair
 
 PLAIN, PAPER, LOCATED = 0, 1, 2
@@ -47,8 +37,7 @@ MOST_EVENTS = 10**6  # rows of memory, which is only taken where it is written
 
 def solve(rule: int, problem: Problem) -> Solution:
     """Integrate with a fixed step; outputs between the steps by cubic Hermite interpolation."""
-    q, y = parameters(problem.system), tuple(problem.system.state.tolist())
-    out, work = np.empty((len(problem.grid), 6)), np.zeros(len(Work), dtype=np.int64)
+    q, y, out, work = begun(problem)
     events = np.empty((0 if rule == PLAIN else min(problem.max_events, MOST_EVENTS), 5))
     mode = np.array([Pair.CONTACT if rule == PLAIN else condition(q, y, side) for side in (LEFT, RIGHT)])
     pairs = mode, np.full(2, -1.0)

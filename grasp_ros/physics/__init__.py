@@ -22,17 +22,7 @@ w, s, G         w, s, g                           regularised variables of a con
 ==============  =====================  =========  ==========================================================
 
 The impact law is that of Hunt and Crossley (1975), with its tension cut off by (10): fw = H u^(3/2) max(0, 1 + p u')
-for u >= 0. Other authors write its dissipation as
-
-======================================  =====================================  =====================
-where                                   the law there                          in our p and H
-======================================  =====================================  =====================
-Hunt, Crossley (1975)                   k u^n + lambda u^n u', n = 3/2         k = H, lambda = p H
-their restitution at low speed v        e = 1 - alpha v                        alpha = 2 p / 3
-Simbody, `HuntCrossleyForce`            k u^(3/2) (1 + (3/2) c u')             k = H, c = 2 p / 3
-Drake, `hunt_crossley_dissipation` d    k u max(0, 1 + d u'), a linear spring  d = p, no k for H
-MuJoCo, `solref` and `solimp`           a linear spring and damper             none
-======================================  =====================================  =====================
+for u >= 0. `docs/explanation/model.md` says what p is in the laws of other authors.
 
 `model` has arm and contact as records and the impact force of any state, `impact_law` the force of a contact, `control`
 the law of a controller, `system` puts a scene into arrays, `layout` says what stands where in them, `energy` computes V

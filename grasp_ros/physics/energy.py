@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from grasp_ros.physics import given
 from grasp_ros.physics.impact_law import stored_energy
-from grasp_ros.physics.layout import EPS, LEFT, OBJECT, Law, Of
+from grasp_ros.physics.layout import EPS, OBJECT, Of
 from grasp_ros.physics.model import Array, Contact, hertzian_force, in_contact, penetration
 from grasp_ros.physics.system import A_SYSTEM, COLUMN, System
 
@@ -56,9 +56,7 @@ def energy(system: System, state: Array, external: Array | None = None, *, feedb
     external = None if external is None else given.rows("external", external, 3)
     given.check_rows(state=state, external=external)
     bodies = given.instance("system", system, System, A_SYSTEM).closed_loop if feedback else system.bodies
-    kinetic: Array = np.zeros(np.shape(state)[:-1])
-    potential: Array = np.zeros(np.shape(state)[:-1])
-    loss: Array = np.zeros(np.shape(state)[:-1])
+    kinetic, potential, loss = np.zeros((3, *state.shape[:-1]))
     for body in system.present:
         moving, held = mechanical_levels(bodies, body, state)
         kinetic, potential = kinetic + moving, potential + held
@@ -71,11 +69,9 @@ def energy(system: System, state: Array, external: Array | None = None, *, feedb
     V = V_c = kinetic + potential
     V_rate = -2.0 * loss
     mode = np.zeros(np.shape(V), dtype=np.int64)
-    for side, u, d in pairs_of(system, state):
-        contact = Contact(*system.pairs[side])
-        force = hertzian_force(contact, u)
+    for side, contact, u, d in pairs_of(system, state):
+        force, stored = hertzian_force(contact, u), elastic_level(contact, u)
         touching = in_contact(contact, u, d)
-        stored = elastic_level(system, side, u)
         V_c = V_c + stored
         V = V + np.where(touching, stored, 0.0)
         V_rate = V_rate + np.where(touching, -2.0 * contact.dissipation * force * d * d, 2.0 * force * d)
@@ -114,22 +110,19 @@ def energy_balance(system: System, before: Array, after: Array, forces: Array) -
     forces, levels = given.rows("forces", forces, 3), []
     given.check_rows(before=before, after=after, forces=forces)
     given.instance("system", system, System, A_SYSTEM)
-    rounding: Array = np.zeros(np.shape(before)[:-1])
+    rounding, work = np.zeros((2, *before.shape[:-1]))
     for state in (before, after):
-        level: Array = np.zeros(np.shape(state)[:-1])
-        size: Array = np.zeros(np.shape(state)[:-1])
+        level, size = np.zeros((2, *state.shape[:-1]))
         for body in system.present:
             x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
             mass, stiffness, _, force = system.bodies[body]
             own, own_size = body_energy(mass, stiffness, force, x, v, _distance(system, body, state))
             level, size = level + own, size + own_size
-        for side, u, _ in pairs_of(system, state):
-            force = hertzian_force(Contact(*system.pairs[side]), u)
-            level = level + elastic_level(system, side, u)
-            rounding = rounding + 8.0 * EPS * force * _distance(system, side, state)
+        for side, contact, u, _ in pairs_of(system, state):
+            level = level + elastic_level(contact, u)
+            rounding = rounding + 8.0 * EPS * hertzian_force(contact, u) * _distance(system, side, state)
         levels.append(level)
         rounding = rounding + ROUNDING * size
-    work: Array = np.zeros(np.shape(before)[:-1])
     for body in system.present:
         work = work + 2.0 * forces[..., body] * (after[..., COLUMN[body]] - before[..., COLUMN[body]])
         rounding = rounding + ROUNDING * np.abs(forces[..., body]) * _distance(system, body, after)
@@ -160,9 +153,9 @@ def mechanical_levels(bodies: Array, body: int, state: Array) -> tuple[Array, Ar
     return bodies[body, Of.MASS] * v * v, potential
 
 
-def elastic_level(system: System, side: int, u: Array) -> Array:
+def elastic_level(contact: Contact, u: Array) -> Array:
     """Twice the elastic energy of a pair, (19): a = b = 4/5; 0 without penetration."""
-    return np.asarray(2.0 * stored_energy(system.pairs[side, Law.HERTZIAN], np.maximum(u, 0.0)))
+    return np.asarray(2.0 * stored_energy(contact.hertzian, np.maximum(u, 0.0)))
 
 
 def _distance(system: System, body: int, state: Array) -> Array:
@@ -171,7 +164,7 @@ def _distance(system: System, body: int, state: Array) -> Array:
     return distance + np.abs(state[..., COLUMN[OBJECT]]) if body != OBJECT and OBJECT in system.present else distance
 
 
-def pairs_of(system: System, state: Array) -> list[tuple[int, Array, Array]]:
-    """Side, u in m and u' in m/s of every pair that can push, from states (..., 6)."""
-    u_l, d_l, u_r, d_r = penetration(state)
-    return [(side, u_l, d_l) if side == LEFT else (side, u_r, d_r) for side in system.contacts]
+def pairs_of(system: System, state: Array) -> list[tuple[int, Contact, Array, Array]]:
+    """Side, impact law, u in m and u' in m/s of every pair that can push, from states (..., 6)."""
+    u = penetration(state)
+    return [(side, Contact(*system.pairs[side]), u[2 * side], u[2 * side + 1]) for side in system.contacts]

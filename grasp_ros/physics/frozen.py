@@ -4,10 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
+from functools import cache
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+
+
+@cache
+def _freezer(kind: type) -> Callable[[Any], Any] | None:
+    """What freezes values of a type, found once for each type, for speed; None: the value is kept."""
+    if issubclass(kind, np.ndarray):
+        return _read_only
+    if hasattr(kind, "items"):
+        return lambda mapping: MappingProxyType({key: frozen(entry) for key, entry in mapping.items()})
+    if issubclass(kind, tuple) and hasattr(kind, "_fields"):
+        return lambda record: kind(*map(frozen, record))
+    return None
 
 
 def _read_only(array: Any) -> Any:
@@ -16,35 +29,9 @@ def _read_only(array: Any) -> Any:
     return view
 
 
-def _unchangeable(mapping: Any) -> Any:
-    return MappingProxyType({key: frozen(entry) for key, entry in mapping.items()})
-
-
-def _frozen_record(record: Any) -> Any:
-    return type(record)(*map(frozen, record))
-
-
-class _Freezers(dict[type, Callable[[Any], Any] | None]):
-    """Functions that freeze values of a type, found once for each type, for speed; None: the value is kept."""
-
-    def __missing__(self, kind: type) -> Callable[[Any], Any] | None:
-        freeze: Callable[[Any], Any] | None = None
-        if issubclass(kind, np.ndarray):
-            freeze = _read_only
-        elif hasattr(kind, "items"):
-            freeze = _unchangeable
-        elif issubclass(kind, tuple) and hasattr(kind, "_fields"):
-            freeze = _frozen_record
-        self[kind] = freeze
-        return freeze
-
-
-_freezers = _Freezers()
-
-
 def frozen(value: Any) -> Any:
     """The same value, read-only: arrays as a view, mappings as a copy."""
-    freeze = _freezers[type(value)]
+    freeze = _freezer(type(value))  # type: ignore[arg-type] # a type is hashable
     return freeze(value) if freeze else value
 
 
@@ -87,9 +74,7 @@ class Frozen:
     def __post_init__(self) -> None:
         """Freeze all fields."""
         own = vars(self)
-        for name, value in own.items():
-            if freeze := _freezers[type(value)]:
-                own[name] = freeze(value)
+        own.update({name: frozen(value) for name, value in own.items()})
 
     def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
         """A new record of the same fields."""

@@ -17,7 +17,7 @@ import numpy as np
 from grasp_ros.physics.energy import elastic_level, mechanical_levels, pairs_of
 from grasp_ros.physics.impact_law import STORED
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of
-from grasp_ros.physics.model import Array, Contact, in_contact
+from grasp_ros.physics.model import Array, in_contact
 from grasp_ros.physics.system import BODIES, System
 
 
@@ -39,9 +39,8 @@ def parts(system: System, state: Array, feedback: bool = True) -> Parts:
     bodies, present = system.closed_loop if feedback else system.bodies, system.present
     levels = [np.add(*mechanical_levels(bodies, body, state)) if body in present else zero for body in BODIES]
     touching = [zero, zero]
-    for side, u, d in pairs_of(system, state):
-        held = in_contact(Contact(*system.pairs[side]), u, d)
-        touching[side] = np.where(held, elastic_level(system, side, u), 0.0)
+    for side, contact, u, d in pairs_of(system, state):
+        touching[side] = np.where(in_contact(contact, u, d), elastic_level(contact, u), 0.0)
     return Parts(*levels, *touching)
 
 
@@ -49,7 +48,7 @@ def deformation(system: System, state: Array) -> Array:
     """Local deformation (..., 2) of both pairs in m: u where it is positive; 0 for a pair that cannot push."""
     state = np.asarray(state, dtype=float)
     found = np.zeros((*np.shape(state)[:-1], 2))
-    for side, u, _ in pairs_of(system, state):
+    for side, _, u, _ in pairs_of(system, state):
         found[..., side] = np.maximum(u, 0.0)
     return found
 

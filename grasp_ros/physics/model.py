@@ -4,8 +4,7 @@ Everything here is written with the paper's letters; every function works on sca
 The integrators in this package do not call it, so that tests can hold their results against it.
 `lab.reference.grasp` has the equations of motion.
 
-The impact law, (6), (7), is that of Hunt and Crossley, see `impact_law`; how its p translates to the symbols of other
-authors stands in the notation, `grasp_ros.physics`.
+The impact law, (6), (7), is that of Hunt and Crossley, see `impact_law`.
 
 References
 ----------

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 import struct
 import uuid
 import zlib
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from tokenize import TokenError
-from typing import BinaryIO, cast
-from zipfile import BadZipFile
+from typing import Any, BinaryIO, cast
+from zipfile import BadZipFile, ZipFile
+
+import numpy as np
 
 from grasp_ros.physics import given
 from grasp_ros.physics.errors import Refused
 
 YAML = (".yaml", ".yml")  # endings of scenes
 TEXT_BYTES = 2**20  # of a scene or of the metadata of a bag
+MOST_BYTES = 2**30  # of all arrays of a file together
+TEXT = "U"  # kind of an array of texts
+DIGEST = "digest"  # name of the checksum of all other arrays
 DAMAGE: tuple[type[Exception], ...] = (  # what decoders raise for files that were damaged at random
     OSError, EOFError, MemoryError, ValueError, TypeError, LookupError, OverflowError, RuntimeError, struct.error,
     zlib.error, BadZipFile, SystemError,  # the last one for a text beyond Unicode
@@ -131,3 +137,44 @@ def decoding(path: object, kind: str, refusal: type[Refused] = Refused, also: tu
             raise refusal(str(error)) from None
         reason = " ".join(str(error).split()) or type(error).__name__
         raise refusal(f"{path}: not {kind}: {reason}") from None
+
+
+def signed(arrays: Mapping[str, object]) -> dict[str, Any]:
+    """The arrays of a file, and their checksum, without which `read_npz` refuses it."""
+    content = {name: np.asarray(values) for name, values in arrays.items() if name != DIGEST}
+    return {**content, DIGEST: np.array(_digest(content))}
+
+
+def _digest(arrays: Mapping[str, np.ndarray]) -> str:
+    """SHA-256 of names, types, shapes and numbers; texts have no width of their own."""
+    found = hashlib.sha256()
+    for name, values in sorted(arrays.items()):
+        text = values.dtype.kind == TEXT
+        content = repr(values.tolist()).encode() if text else values.tobytes()
+        found.update(repr((name, TEXT if text else values.dtype.str, values.shape, len(content))).encode() + content)
+    return found.hexdigest()
+
+
+def read_npz(path: Path) -> dict[str, np.ndarray]:
+    """All arrays of a .npz file, of numbers and texts, whose checksum is that of `signed`.
+
+    What is wrong with it is refused, or raises what DAMAGE lists. Nothing is evaluated but the headers, as literals of
+    Python.
+    """
+    found: dict[str, np.ndarray] = {}
+    with ZipFile(path) as members:
+        total = sum(member.file_size for member in members.infolist())
+    if total > MOST_BYTES:
+        raise Refused(f"{total} bytes of numbers; allowed: at most {MOST_BYTES}")
+    with np.load(path, allow_pickle=False) as archive:
+        for name in archive.files:
+            try:
+                found[name] = archive[name]
+            except DAMAGE as error:
+                raise Refused(f"{name}: {error}") from None
+            if not isinstance(found[name], np.ndarray):  # of a member that does not begin as numpy's do
+                raise Refused(f"{name}: not a NumPy array")
+    said = str(found.pop(DIGEST, ""))
+    if said != _digest(found):
+        raise Refused(f"{DIGEST}: {said[:64]!r}; allowed: the checksum of these arrays; the file has changed")
+    return found

@@ -26,13 +26,10 @@ from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, Parameter
 from grasp_ros.scene.effects.loop import HELD
 from grasp_ros.scene.effects.time import nanoseconds, period_ns
 from grasp_ros.scene.files import YAML, read_text, reading
-from grasp_ros.scene.settings import apply, texts_of_changed
 from grasp_ros.scene.strict_yaml import dump
 from grasp_ros.scene.strict_yaml import load as load_yaml
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, Topic
-from grasp_ros.scene.validation import SceneError, check_domain, check_keys, check_together, read_sections, read_texts
-
-TEXTS = ("title", "readings", "watch")
+from grasp_ros.scene.validation import TEXTS, SceneError, apply_settings, check_domain, check_keys, read, read_sections
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -255,7 +252,7 @@ def parse(text: str, name: str, source: str, settings: Sequence[str] = ()) -> Sc
     if settings := given.names("settings", settings):
         with suppress(SceneError):  # what is wrong without settings may be right with them
             before = read_sections(source, document)
-    apply(settings, document)
+    apply_settings(settings, document)
     return _read(document, name, source, before)
 
 
@@ -289,11 +286,6 @@ def compose(
 
 def _read(document: Mapping[Any, Any], name: str, source: str, before: Mapping[str, Any] | None = None) -> Scene:
     """The one place where a scene is made: from a file, from sections, or from a scene with the numbers `before`."""
-    check_keys(source, "", document, (*TEXTS, *BY_SECTION), ("title", "readings", "time"))
-    title, readings, watch = read_texts(source, document)
-    values = read_sections(source, document)
-    check_together(source, values)
-    title, watch = texts_of_changed(title, watch, before, values)
-    scene = Scene(name, title, readings, watch, values)
-    check_domain(source, values, scene.system)
+    scene = Scene(name, *read(source, document, before))
+    check_domain(source, scene.values, scene.system)
     return scene

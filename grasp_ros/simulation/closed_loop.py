@@ -28,7 +28,6 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.own_law import begin
-from grasp_ros.simulation.progress import Callback
 from grasp_ros.simulation.sampled_plant import LoopRecord, Outputs, SampledPlant
 
 PATIENCE = 0.1  # s that a block of ticks may take
@@ -73,7 +72,7 @@ def check_changes(scene: Scene, held: bool, changes: Changes, by_user: Iterable[
 
 def drive_sampled(
     scene: Scene, integrator: Integrator, grid: Array, changes: Changes = NO_CHANGES,
-    by_user: Mapping[int, UserController] = NO_USER_CONTROLLERS, progress: Callback | None = None,
+    by_user: Mapping[int, UserController] = NO_USER_CONTROLLERS,
 ) -> tuple[Array, LoopRecord]:
     """States (n, 6) under controllers that answer at every tick, and what went through the loop.
 
@@ -98,8 +97,8 @@ def drive_sampled(
         done = rows.stop
         if plant.status is not Status.DONE:
             break
-        if progress is not None:
-            progress(plant.time)
+        if integrator.progress is not None:
+            integrator.progress(plant.time)
     return states[:done], LoopRecord(command[:done], inputs[:done])
 
 
@@ -182,7 +181,7 @@ def solve(
 
     def run_sampled(integrator: Integrator) -> Array:
         nonlocal loop
-        states, loop = drive_sampled(scene, integrator, problem.grid, changes, by_user, problem.progress)
+        states, loop = drive_sampled(scene, integrator, problem.grid, changes, by_user)
         return states
 
     if problem.sampled:

@@ -13,7 +13,7 @@ from grasp_ros.physics.given import text
 from grasp_ros.physics.impact_law import elastic_slope
 from grasp_ros.physics.layout import EPS, Body, Entry, Transition
 from grasp_ros.physics.lyapunov import deformation
-from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
+from grasp_ros.physics.model import Array, hertzian_force, impact_force
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.simulation.repeat import breaks_of, reached
@@ -84,11 +84,9 @@ def contact_table(run: Trajectory, side: Body) -> np.ndarray:
 
 def _quantities_of(system: System, side: int) -> Quantity:
     """Force in N, power lost in W, and penetration in m of one pair."""
-    contact = Contact(*system.pairs[side].tolist())
-
     def quantities(_: Array, state: Array) -> tuple[Array, Array]:
         state = np.nan_to_num(state)
-        [(u, d)] = [(u, d) for other, u, d in pairs_of(system, state) if other == side]
+        contact, u, d = next((law, u, d) for other, law, u, d in pairs_of(system, state) if other == side)
         u = np.maximum(u, 0.0)
         force, elastic = impact_force(contact, u, d), hertzian_force(contact, u)
         rounding = ROUNDINGS * np.abs(state[:, 0::2]).max(axis=1)

@@ -16,9 +16,9 @@ from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.impact_law import elastic_force, stored_energy
 from grasp_ros.physics.layout import Entry, Law, Of
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import COLUMN, PAIR_COLUMNS, System
+from grasp_ros.physics.system import COLUMN, PAIR_COLUMNS
 from grasp_ros.scene import Scene
-from grasp_ros.sensitivity.directions import Directions, closing, directions
+from grasp_ros.sensitivity.directions import closing, directions
 from grasp_ros.sensitivity.event_times import Moments, event_rates
 from grasp_ros.sensitivity.run import Carrier
 from grasp_ros.simulation.chunk import Chunk, Setup, Variants
@@ -74,9 +74,28 @@ class Sensitivity(Frozen):
     @property
     def V_c_rates(self) -> Array:
         """Derivatives (m, n) of V_c."""
-        system = self.scene.system
+        system, state = self.scene.system, self.state
         changes = directions(self.scene, self.keys, False).closed_loop(system)
-        return level_rates(system, changes, self.state, self.state_rates)
+        gradient, explicit, weights, bodies = np.zeros_like(state), [], [], system.closed_loop
+        columns = [column for body in system.present for column in (COLUMN[body], COLUMN[body] + 1)]
+        for body in system.present:
+            column = COLUMN[body]
+            x, v = state[:, column], state[:, column + 1]
+            mass, stiffness, _, force = bodies[body]
+            away = force / stiffness if stiffness > 0.0 else 0.0
+            gradient[:, column], gradient[:, column + 1] = 2.0 * (stiffness * x - force), 2.0 * mass * v
+            explicit += [v * v, x * x - away * away, 2.0 * (away - x)]
+            weights += [changes.bodies[body, column] for column in (Of.MASS, Of.STIFFNESS, Of.FORCE)]
+        for side in system.contacts:
+            pressed = np.maximum(closing(side, state)[0], 0.0)
+            push = 2.0 * elastic_force(system.pairs[side, Law.HERTZIAN], pressed)
+            front, back = PAIR_COLUMNS[side]
+            gradient[:, front] += push
+            gradient[:, back] -= push
+            explicit.append(2.0 * stored_energy(1.0, pressed))
+            weights.append(changes.pairs[side, Law.HERTZIAN])
+        moved = np.einsum("mi,min->mn", gradient[:, columns], self.state_rates[:, columns])
+        return np.asarray(moved + np.stack(explicit, axis=1) @ np.array(weights))
 
 
 def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
@@ -107,37 +126,11 @@ def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
 
 def complete(scene: Scene, integrator: Integrator, sampled: bool, times: Array) -> Array:
     """Run a scene to its end, as `simulate` does, or refuse; states (m, 6) at output times (m,) in s, in any order."""
-    order = np.argsort(times, kind="stable")
-    ascending = drive(scene, integrator, sampled, times[order])
+    grid, index = np.unique(times, return_inverse=True)
+    states = drive(scene, integrator, sampled, grid)
     if integrator.status is not Status.DONE:
         raise Refused(f"{scene.name}: no derivatives of a run that {integrator.stop}")
-    states = np.empty_like(ascending)
-    states[order] = ascending
-    return states
-
-
-def level_rates(system: System, changes: Directions, state: Array, rates: Array) -> Array:
-    """Derivatives (m, n) of V_c at states (m, 6) with derivatives (m, 6, n); of bodies with the feedback in them."""
-    gradient, explicit, weights, bodies = np.zeros_like(state), [], [], system.closed_loop
-    columns = [column for body in system.present for column in (COLUMN[body], COLUMN[body] + 1)]
-    for body in system.present:
-        column = COLUMN[body]
-        x, v = state[:, column], state[:, column + 1]
-        mass, stiffness, _, force = bodies[body]
-        away = force / stiffness if stiffness > 0.0 else 0.0
-        gradient[:, column], gradient[:, column + 1] = 2.0 * (stiffness * x - force), 2.0 * mass * v
-        explicit += [v * v, x * x - away * away, 2.0 * (away - x)]
-        weights += [changes.bodies[body, column] for column in (Of.MASS, Of.STIFFNESS, Of.FORCE)]
-    for side in system.contacts:
-        pressed = np.maximum(closing(side, state)[0], 0.0)
-        push = 2.0 * elastic_force(system.pairs[side, Law.HERTZIAN], pressed)
-        front, back = PAIR_COLUMNS[side]
-        gradient[:, front] += push
-        gradient[:, back] -= push
-        explicit.append(2.0 * stored_energy(1.0, pressed))
-        weights.append(changes.pairs[side, Law.HERTZIAN])
-    moved = np.einsum("mi,min->mn", gradient[:, columns], rates[:, columns])
-    return np.asarray(moved + np.stack(explicit, axis=1) @ np.array(weights))
+    return states[index]
 
 
 def with_derivatives(chunk: Chunk, variants: Variants, setup: Setup, keys: Sequence[str], stop: NDArray[np.int64]

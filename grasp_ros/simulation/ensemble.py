@@ -189,17 +189,24 @@ def in_threads(work: Callable[[Span, NDArray[np.int64]], T], spans: Iterable[Spa
     The work also gets an array (1,) to poll: not 0 asks it to stop, for example after a Ctrl-C.
     """
     workers = whole("threads", threads, 1) if threads is not None else os.cpu_count() or 1
-    waiting: dict[Future[T], Span] = {}
-    following, stop = iter(spans), np.zeros(1, dtype=np.int64)
+    stop = np.zeros(1, dtype=np.int64)
     with ThreadPoolExecutor(workers) as pool:
         try:
-            while True:
-                for span in islice(following, 2 * workers - len(waiting)):
-                    waiting[pool.submit(work, span, stop)] = span
-                if not waiting:
-                    return
-                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-                    yield waiting.pop(future), future.result()
+            for span, future in each_done(lambda span: pool.submit(work, span, stop), spans, 2 * workers):
+                yield span, future.result()
         finally:
             stop[0] = 1
             pool.shutdown(wait=False, cancel_futures=True)
+
+
+def each_done(submit: Callable[[Span], Future[T]], spans: Iterable[Span], most: int
+              ) -> Generator[tuple[Span, Future[T]], None, None]:
+    """Submit chunks, at most so many at a time, and yield each when it is done."""
+    waiting: dict[Future[T], Span] = {}
+    following = iter(spans)
+    while True:
+        waiting.update((submit(span), span) for span in islice(following, most - len(waiting)))
+        if not waiting:
+            return
+        for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+            yield waiting.pop(future), future

@@ -13,7 +13,7 @@ import numpy as np
 
 from grasp_ros.physics.energy import pairs_of
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Of
-from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
+from grasp_ros.physics.model import Array, hertzian_force, impact_force
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.simulation.repeat import as_row, at_every_tick
 from grasp_ros.simulation.trajectory import Trajectory, check_run
@@ -39,8 +39,7 @@ def power_lost(system: System, state: Array) -> Losses:
     speed[:, system.present] = state[:, [COLUMN[body] + 1 for body in system.present]]
     damping, loop = system.bodies[:, Of.DAMPING], system.closed_loop[:, Of.DAMPING]
     arms, impacts = speed[:, :OBJECT] ** 2, np.zeros(len(state))
-    for side, u, d in pairs_of(system, state):
-        contact = Contact(*system.pairs[side])
+    for _, contact, u, d in pairs_of(system, state):
         impacts += (impact_force(contact, u, d) - hertzian_force(contact, u)) * d
     friction = damping[OBJECT] * speed[:, OBJECT] ** 2 + system.coulomb * np.abs(speed[:, OBJECT])
     return Losses(arms @ damping[:OBJECT], arms @ (loop - damping)[:OBJECT], impacts, friction)
@@ -60,7 +59,7 @@ def losses(run: Trajectory) -> Losses:
         there are none.
     """
     row = as_row(check_run(run), "energy")
-    return losses_of(at_every_tick(run) if row is None or needs_ticks(run) else run, row)
+    return losses_of(at_every_tick(run) if row is None or needs_ticks(run) else run, row)[0]
 
 
 def needs_ticks(run: Trajectory) -> bool:
@@ -71,34 +70,23 @@ def needs_ticks(run: Trajectory) -> bool:
     return bool(run.sampled and run.scene.system.external)
 
 
-def external_work(run: Trajectory, row: Mapping[str, float] | None) -> float:
-    """Work of the external forces in J, over what `losses_of` is of."""
-    if row is not None and not run.sampled:
-        return row["work_inputs"]
-    return float((run.external[:-1] * _moves(run)).sum())
-
-
-def _moves(run: Trajectory) -> Array:
-    """How far the bodies LEFT, RIGHT, OBJECT come from output to output, (n - 1, 3) in m; 0 for an absent one."""
-    return np.diff(np.nan_to_num(run.state[:, [COLUMN[body] for body in Body]]), axis=0)
-
-
-def losses_of(run: Trajectory, row: Mapping[str, float] | None) -> Losses:
-    """The losses from the row of an exact run that has its energies, see `repeat.as_row`, and `needs_ticks`.
+def losses_of(run: Trajectory, row: Mapping[str, float] | None) -> tuple[Losses, float]:
+    """The losses, and the work of external forces in J, from the row of an exact run, see `as_row` and `needs_ticks`.
 
     Without a row by the trapezoidal rule, of a run whose output times hold every control period.
     """
     system, arms = run.scene.system, [COLUMN[LEFT], COLUMN[RIGHT]]
+    moves = np.diff(np.nan_to_num(run.state[:, [COLUMN[body] for body in Body]]), axis=0)  # 0 of an absent body
+    external = float((run.external[:-1] * moves).sum())
     if row is None:
         found = Losses(*(np.asarray(np.trapezoid(rate, run.t)) for rate in power_lost(system, run.state)))
     else:
         found = Losses(*(np.asarray(row[f"lost_{cause}"]) for cause in Losses._fields))
     if not run.sampled:
-        return found
-    work = float((run.inputs[:-1] * _moves(run)).sum()) if row is None else row["work_inputs"]
-    work -= external_work(run, row)
+        return found, external if row is None else row["work_inputs"]
+    work = float((run.inputs[:-1] * moves).sum()) if row is None else row["work_inputs"]
     own = 0.0 if run.controllers else 1.0  # what a user's controller stores is not known
     _, stiffness, _, force = own * (system.closed_loop - system.bodies)[:OBJECT].T  # of the feedback
     ends = np.stack([run.scene.initial_state, np.nan_to_num(run.state[-1])])[:, arms]
     before, after = (0.5 * stiffness * ends**2 - force * ends).sum(axis=1)
-    return found._replace(feedback=np.asarray(before - after - work))  # what commands have not stored in V_c
+    return found._replace(feedback=np.asarray(before - after - (work - external))), external  # not stored in V_c

@@ -27,7 +27,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.simulation.chunk import HORIZONS, SETTLED
 from grasp_ros.simulation.contacts import intervals, side_of
-from grasp_ros.simulation.losses import external_work, losses_of, needs_ticks
+from grasp_ros.simulation.losses import losses_of, needs_ticks
 from grasp_ros.simulation.outcomes import GROUPS
 from grasp_ros.simulation.repeat import as_row, at_every_tick
 from grasp_ros.simulation.trajectory import Trajectory, check_run
@@ -161,10 +161,11 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
         found["largest_of"], largest = MOTION, [row[name] for name in PEAKS]
     found["largest_N"] = dict(zip(FORCES, largest, strict=True))
     if (dense is not None and len(dense.t) > 1) or (row is not None and not needs_ticks(run)):
-        found["lost_J"] = {cause: float(value) for cause, value in losses_of(known, row)._asdict().items()}
+        lost, work = losses_of(known, row)
+        found["lost_J"] = {cause: float(value) for cause, value in lost._asdict().items()}
         found["lost_by"] = TICKS if row is None else MOTION
         if scene.system.external:
-            found["work_external_J"] = external_work(known, row)
+            found["work_external_J"] = work
     return found
 
 

@@ -12,11 +12,9 @@ from grasp_ros.physics.energy import Energy
 from grasp_ros.physics.errors import need
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import BODIES, NAMES
+from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES, UNITS
 from grasp_ros.scene.files import opened
-
-if TYPE_CHECKING:
-    from grasp_ros.scene import Scene
 
 A_MOTION = "a Trajectory or a Recording"
 _ENDINGS = {unit: ending for ending, unit in reversed(UNITS.items())} | {"J": "_J", "W": "_W", "1": ""}

@@ -21,11 +21,10 @@ from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.given import instance, number, times
 from grasp_ros.physics.layout import LEFT, RIGHT, Body, Entry, Transition
 from grasp_ros.physics.lyapunov import Parts, largest_deformation, parts
-from grasp_ros.physics.model import Array, Contact, impact_force
+from grasp_ros.physics.model import Array, impact_force
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.files import opened
-from grasp_ros.scene.npz import signed
+from grasp_ros.scene.files import opened, signed
 from grasp_ros.simulation.contacts import check_located, contact_table, side_of
 from grasp_ros.simulation.repeat import breaks_of, states_at
 from grasp_ros.simulation.sampled_plant import LoopRecord, tick_of
@@ -160,8 +159,8 @@ class Trajectory(Motion, Frozen):
     def impacts(self) -> Array:
         """Impact forces fw_l, fw_r (n, 2) at the output times in N; 0 where there is no contact, or none at all."""
         forces = np.zeros((len(self.t), 2))
-        for side, u, d in pairs_of(self.scene.system, self.state):
-            forces[:, side] = impact_force(Contact(*self.scene.system.pairs[side]), u, d)
+        for side, contact, u, d in pairs_of(self.scene.system, self.state):
+            forces[:, side] = impact_force(contact, u, d)
         return forces
 
     def at(self, t: ArrayLike) -> Array:

@@ -12,8 +12,7 @@ from grasp_ros.methods.registry import find
 from grasp_ros.physics import given
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.files import decoding, reading
-from grasp_ros.scene.npz import TEXT, read_npz
+from grasp_ros.scene.files import TEXT, decoding, read_npz, reading
 from grasp_ros.simulation.sampled_plant import LoopRecord
 from grasp_ros.simulation.trajectory import Trajectory
 

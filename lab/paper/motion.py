@@ -7,9 +7,9 @@ import numpy as np
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Status
 from grasp_ros.physics.energy import energy, pairs_of
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of, Transition
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of, Transition
 from grasp_ros.physics.lyapunov import largest_deformation
-from grasp_ros.physics.model import Array, Contact, Mode, hertzian_force
+from grasp_ros.physics.model import Array, Mode, hertzian_force
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, simulate
@@ -81,10 +81,9 @@ def enclosed(scene: Scene) -> Found:
 @threshold("smallest p u' while u > 0: above -1", least=True)
 def separates_slowly(scene: Scene) -> Found:
     """No pair separates faster than 1/p while it penetrates."""
-    system = scene.system
     slowest = min(
-        float((system.pairs[side, Law.DISSIPATION] * d)[u > 0.0].min(initial=0.0))
-        for side, u, d in pairs_of(system, run_of(scene).state)
+        float((contact.dissipation * d)[u > 0.0].min(initial=0.0))
+        for _, contact, u, d in pairs_of(scene.system, run_of(scene).state)
     )
     return Found(slowest, slowest > -1.0)
 
@@ -92,10 +91,9 @@ def separates_slowly(scene: Scene) -> Found:
 @threshold("smallest term >= 0 W", " W", least=True)
 def collision_term_lowers(scene: Scene) -> Found:
     """The collision terms of (18) are never negative."""
-    pairs = scene.system.pairs
     term = min(
-        float((2.0 * pairs[side, Law.DISSIPATION] * hertzian_force(Contact(*pairs[side]), u) * d * d).min())
-        for side, u, d in pairs_of(scene.system, run_of(scene).state)
+        float((2.0 * contact.dissipation * hertzian_force(contact, u) * d * d).min())
+        for _, contact, u, d in pairs_of(scene.system, run_of(scene).state)
     )
     return Found(term, term >= 0.0)
 

@@ -64,7 +64,7 @@ class Sample:
 
     def pair(self, side: int) -> tuple[Array, Array]:
         """u and u' of one side."""
-        return next((u, d) for which, u, d in pairs_of(self.system, self.state) if which == side)
+        return next((u, d) for which, _, u, d in pairs_of(self.system, self.state) if which == side)
 
     def where(self, mode: Mode) -> np.ndarray:
         """Places in a condition of contact."""

@@ -11,7 +11,7 @@ from typing import Any
 
 from grasp_ros import scene as scenes
 from grasp_ros.cli import main as cli
-from grasp_ros.cli.commands import COMMANDS
+from grasp_ros.cli.parser import COMMANDS
 from grasp_ros.exact import Status
 from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Mode

@@ -7,8 +7,7 @@ from pathlib import Path
 
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
-from grasp_ros.accuracy.compare import fastest
-from grasp_ros.accuracy.measure import OURS, Record
+from grasp_ros.accuracy.measure import OURS, Record, fastest
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from grasp_ros.accuracy.compare import by_method, fastest
-from grasp_ros.accuracy.measure import Record
+from grasp_ros.accuracy.measure import Record, by_method, fastest
 from grasp_ros.methods.contract import TOLERANCE
 from grasp_ros.methods.registry import EXACT, METHODS
 from lab.studies import accuracy, predictability

@@ -12,8 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from grasp_ros.accuracy.compare import by_method
-from grasp_ros.accuracy.measure import Record
+from grasp_ros.accuracy.measure import Record, by_method
 from grasp_ros.methods.contract import STEP
 from grasp_ros.physics.model import Arm
 from grasp_ros.physics.sampled import spectral_radius

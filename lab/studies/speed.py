@@ -7,8 +7,7 @@ import statistics
 from functools import partial
 from typing import NamedTuple
 
-from grasp_ros.accuracy.compare import compare, fastest
-from grasp_ros.accuracy.measure import Record, Truth, contender_of
+from grasp_ros.accuracy.measure import Record, Truth, compare, contender_of, fastest
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.scene import Scene
 from lab.studies import peer_heyoka

@@ -14,8 +14,19 @@ from documents import case_of
 from measurements import record
 
 from grasp_ros import scene as scenes
-from grasp_ros.accuracy.compare import QUICK, advise, compare, fastest
-from grasp_ros.accuracy.measure import NOT_INSTALLED, Answer, Contender, Truth, attempt, finest, own_contenders
+from grasp_ros.accuracy.measure import (
+    NOT_INSTALLED,
+    QUICK,
+    Answer,
+    Contender,
+    Truth,
+    advise,
+    attempt,
+    compare,
+    fastest,
+    finest,
+    own_contenders,
+)
 from grasp_ros.cli.accuracy import _not_here, _table
 from grasp_ros.physics.errors import Refused
 from grasp_ros.simulation import simulate

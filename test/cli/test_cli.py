@@ -14,8 +14,8 @@ import pytest
 from processes import GRASP, ran
 
 from grasp_ros import scene, simulation
-from grasp_ros.cli.commands import COMMANDS
 from grasp_ros.cli.main import _parser
+from grasp_ros.cli.parser import COMMANDS
 
 
 def test_scenes_lists_all_with_their_titles(command: Any) -> None:

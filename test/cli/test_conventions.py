@@ -16,7 +16,7 @@ import yaml
 from processes import GRASP, ran
 
 from grasp_ros import scene, simulation
-from grasp_ros.cli.commands import COMMANDS
+from grasp_ros.cli.parser import COMMANDS
 
 SHORT = ("--set", "time.duration_s=1")
 
@@ -173,7 +173,7 @@ def test_what_is_written_under_a_name_in_capitals_is_read_under_it(command: Any)
 
 @pytest.mark.parametrize("name", scene.names())
 def test_a_new_scene_is_the_one_it_is_like_and_every_offer_can_be_taken(name: str) -> None:
-    from grasp_ros.scene.commented import commented
+    from grasp_ros.cli.scenes import commented
 
     like = scene.load(name)
     text = commented(like)

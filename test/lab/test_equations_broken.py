@@ -126,7 +126,7 @@ def test_a_row_flips(
 def test_the_pieces_are_those_that_are_broken() -> None:
     """What the breaks stand in for, on one state."""
     found = next(each for each in _motions() if each.crosses)
-    u, d = next((u, d) for side, u, d in pairs_of(found.system, found.state) if side == LEFT)
+    u, d = next((u, d) for side, _, u, d in pairs_of(found.system, found.state) if side == LEFT)
     contact = found.grasp.left_contact
     assert (np.asarray(in_contact(contact, u, d)) != shifted(contact, u, d)).any()
     assert (without_tension_cut(contact, u, d) < -1e-6).any()

@@ -20,9 +20,8 @@ from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.accuracy.measure import Record
 from grasp_ros.physics.errors import LONGEST, Refused
-from grasp_ros.scene import npz
-from grasp_ros.scene.files import replaced
-from grasp_ros.scene.npz import signed
+from grasp_ros.scene import files
+from grasp_ros.scene.files import replaced, signed
 from grasp_ros.scene.strict_yaml import MOST_NODES
 from grasp_ros.simulation import plots, simulate
 from lab.studies.records import Journal, digest
@@ -164,7 +163,7 @@ def test_an_encrypted_or_swollen_result_is_refused(
     (tmp_path / "a.npz").write_bytes(content)
     with pytest.raises(Refused, match="encrypted"):
         simulation.load(tmp_path / "a.npz")
-    monkeypatch.setattr(npz, "MOST_BYTES", 2**20)
+    monkeypatch.setattr(files, "MOST_BYTES", 2**20)
     with zipfile.ZipFile(tmp_path / "b.npz", "w", zipfile.ZIP_DEFLATED) as archive:
         for name in arrays:
             archive.writestr(f"{name}.npy", bytes(2**16))

@@ -28,7 +28,7 @@ from grasp_ros.graph.bag.recorder import Recorder
 from grasp_ros.graph.parameters import PEER_SECONDS, Running
 from grasp_ros.maps import store
 from grasp_ros.physics.errors import Refused
-from grasp_ros.scene.npz import signed
+from grasp_ros.scene.files import signed
 from grasp_ros.scene.scene import Scene
 from grasp_ros.simulation import simulate
 from lab.drills import recorder

@@ -1,27 +1,16 @@
 """The effects that a scene can name, from a file each."""
 
 from collections.abc import Collection, Mapping
+from importlib import import_module
 from typing import Any
 
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects import (
-    bodies,
-    contact,
-    feedback,
-    force,
-    friction,
-    loop,
-    rate,
-    saturation,
-    sensing,
-    tilt,
-    time,
-)
 from grasp_ros.scene.effects.base import Effect
 
 # In the order of the topics in a bag, in which effects build the system, too.
-FILES = (time, bodies, feedback, contact, loop, rate, sensing, saturation, friction, tilt, force)
-EFFECTS: tuple[Effect, ...] = tuple(effect for file in FILES for effect in file.EFFECTS)
+FILES = ("time", "bodies", "feedback", "contact", "loop", "rate", "sensing", "saturation", "friction", "tilt", "force")
+EFFECTS: tuple[Effect, ...] = tuple(
+    effect for name in FILES for effect in import_module(f"{__name__}.{name}").EFFECTS)
 BY_SECTION = {effect.section: effect for effect in EFFECTS}
 PAPER = frozenset(  # the sections of the paper's grasp
     ("time", "left_arm", "object", "right_arm", "left_contact", "right_contact", "left_feedback", "right_feedback")

@@ -78,8 +78,9 @@ class Parameter(NamedTuple):
         """Whether a value from a file, or from Python, is of the right kind and in the range; NaN is in no range."""
         if self.several:
             row = isinstance(value, (list, tuple)) or (hasattr(value, "__array__") and getattr(value, "ndim", 0) == 1)
-            return row and len(value) > 0 and all(self._accepts_one(plain(entry)) for entry in value)
-        return self._accepts_one(plain(value))
+            return row and len(value) > 0 and all(map(self._replace(several=False).accepts, value))
+        number = plain(value)
+        return number is not None and bool(self.holds(number))
 
     def read(self, value: Any) -> Any:
         """An accepted value as float, int or tuple of floats."""
@@ -93,9 +94,6 @@ class Parameter(NamedTuple):
         if self.whole:  # 7.0 is whole: messages carry nothing else
             within = within & (values % 1 == 0)
         return within & ((values == 0.0) | (abs(values) >= self.smallest)) if self.has_smallest else within
-
-    def _accepts_one(self, value: int | float | None) -> bool:
-        return value is not None and bool(self.holds(value))
 
 
 class Output(NamedTuple):

@@ -19,6 +19,7 @@ SPRING = Parameter("stiffness_N_per_m", *RANGES["stiffness of an arm"].bounds, "
                    target=("bodies", Of.STIFFNESS))
 DAMPER = Parameter("damping_Ns_per_m", *RANGES["damping, drag"].bounds, "damper of the arm, c", optional=True,
                    target=("bodies", Of.DAMPING))
+NEGATIVE = "a negative one drives an arm away, or adds energy"
 SUMS = {"stiffness_N_per_m": "position_gain_N_per_m", "damping_Ns_per_m": "velocity_gain_Ns_per_m"}
 
 
@@ -28,18 +29,14 @@ def _negative_sum(side: str, own: str, gain: str, sections: Sections) -> Iterabl
         yield problem(f"{side}_arm, {side}_feedback: {own} + {gain}", total, "a sum >= 0")
 
 
-def _relations(side: str) -> Iterable[Relation]:
-    why = "a negative one drives an arm away, or adds energy"
-    for own, gain in SUMS.items():
-        yield Relation(f"`{own}` + `{gain}` of its feedback >= 0", why, partial(_negative_sum, side, own, gain))
-
-
 EFFECTS = (
     *(
         Effect(
             f"{side}_arm", f"{side} arm: a mass, with a spring and a damper to the ground where they are named",
             (MASS_KG, SPRING, DAMPER, *MOTION), nothing, "m x'^2 + k x^2; the damper takes 2 c x'^2", row=body,
-            relations=tuple(_relations(side)),
+            relations=tuple(
+                Relation(f"`{own}` + `{gain}` of its feedback >= 0", NEGATIVE, partial(_negative_sum, side, own, gain))
+                for own, gain in SUMS.items()),
         )
         for side, body in SIDES.items()
     ),
