@@ -76,18 +76,18 @@ def _paper(options: Options) -> int:
 
 def _fuzz(options: Options) -> int:
     from lab.cases import degenerate
-    from lab.drills import fuzz, random_scenes
+    from lab.drills import fuzz
     from lab.studies import pages
 
     seconds = _seconds(options.seconds, options.draws)
     ordinary = degenerate.ORDINARY if options.ordinary is None else options.ordinary
     pages.claim(options.output / "scene.yaml")
     prepare()
-    memory = None if options.docs is None else random_scenes.Kept(options.output, options.seed, ordinary)
+    memory = None if options.docs is None else fuzz.Kept(options.output, options.seed, ordinary)
     book = fuzz.run(options.seed, options.output, seconds=seconds, draws=options.draws, first=options.first,
                     jobs=options.jobs, memory=memory, ordinary=ordinary)
     if options.docs is not None:
-        random_scenes.write_page(options.docs, options.seed, options.first, book, ordinary)
+        fuzz.write_page(options.docs, options.seed, options.first, book, ordinary)
     return 1 if book.broken else 0
 
 

@@ -19,10 +19,9 @@ from grasp_ros.scene import Scene
 from grasp_ros.simulation import canvas, simulate
 from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, V_COLOR, shade_contacts
 from lab.paper.arms import STEPS, Damped, Stiffer
-from lab.paper.beyond import Chaos, Gap, Tail
+from lab.paper.beyond import MOVED, SMALLEST, Chaos, Edge, Gap, Tail
 from lab.paper.compare import wholly
 from lab.paper.figures import PAGE, STYLE
-from lab.paper.knife_edge import MOVED, SMALLEST, Edge
 from lab.paper.scatter import Median
 
 WIDE = (PAGE, 3.0)

@@ -15,14 +15,14 @@ from markupsafe import Markup
 from ruamel.yaml import YAML
 
 from grasp_ros.scene.files import writing
-from lab.paper import arms, beyond, cases, claims, equation_table, knife_edge, measures, scatter, universal
+from lab.paper import arms, beyond, cases, claims, equation_table, measures, scatter, universal
 from lab.paper.claims import Claim, Kind, Part, Verdict, tally
 from lab.paper.equation_table import Equation
 from lab.paper.equations import CROSSING
 from lab.paper.printed import PRINTED
 from lab.paper.prints import Compared
+from lab.paper.quantities import Uncertainties
 from lab.paper.results import Beyond, tables
-from lab.paper.uncertainties import Uncertainties
 from lab.studies import pages
 from lab.studies.records import write_csv
 
@@ -31,7 +31,7 @@ TEMPLATES = Path(__file__).with_name("templates")
 FIGURES = "paper"  # directory of the figures beside the Markdown page
 NUMBERED = "P", "C"  # letters of the claims that the paper numbers
 WORDS = {  # what `words.yaml` names beside the fields of a report
-    "math": math, "arms": arms, "beyond": beyond, "cases": cases, "edge": knife_edge, "measures": measures,
+    "math": math, "arms": arms, "beyond": beyond, "cases": cases, "measures": measures,
     "rule": claims, "scatter": scatter, "table": equation_table, "universal": universal, "kinds": Kind,
     "verdicts": Verdict, "steps": arms.STEPS, "never": math.inf, "crossing": CROSSING, "tally": tally,
 }

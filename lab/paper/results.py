@@ -9,9 +9,8 @@ import numpy as np
 
 from grasp_ros.physics.system import NAMES
 from lab.paper.arms import Damped, Stepped, Stiffer
-from lab.paper.beyond import WITHIN, Chaos, Gap, Tail
+from lab.paper.beyond import MOVED, VISIBLE, WITHIN, Chaos, Edge, Gap, Tail
 from lab.paper.cases import PRINTED, SYMMETRIC
-from lab.paper.knife_edge import MOVED, VISIBLE, Edge
 
 Table = list[dict[str, str]]
 

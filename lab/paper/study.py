@@ -31,15 +31,13 @@ from lab.paper.cases import (
 from lab.paper.claims import Claim
 from lab.paper.compare import Comparison
 from lab.paper.equations import equations
-from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import MEASURES
 from lab.paper.page import Picture, Report
 from lab.paper.prints import LETTERS, compared
-from lab.paper.quantities import quantities
+from lab.paper.quantities import quantities, uncertainties
 from lab.paper.replay import replays
 from lab.paper.results import Beyond
 from lab.paper.statements import STATEMENTS
-from lab.paper.uncertainties import uncertainties
 
 RANDOM_STARTS = 200
 DPI = 220
@@ -77,7 +75,7 @@ def _jobs(cases: Cases, drawn: list[Start]) -> Jobs:
     return {
         "chaos": (beyond.chaos, cases, started(cases[2], SYMMETRIC)), "stiffer": (arms.stiffer, cases, drawn),
         "damped": (arms.damped, cases, drawn), "gap": (beyond.gap, cases), "tail": (beyond.tail, cases[1]),
-        "stepped": (arms.stepped, cases), "edge": (knife_edge, cases), "equations": (equations, cases),
+        "stepped": (arms.stepped, cases), "edge": (beyond.knife_edge, cases), "equations": (equations, cases),
         "quantities": (quantities, cases), "uncertainties": (uncertainties, cases), "replays": (replays, cases),
     }
 
