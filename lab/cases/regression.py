@@ -98,13 +98,9 @@ def _known() -> dict[str, dict[str, Any]]:
 
 
 def answer(scene: Scene) -> Answer:
-    """Integrate a scene with DIGITS digits.
+    """Integrate a scene with DIGITS digits, at the end of the horizon and not after half of that.
 
-    Returns
-    -------
-    Answer
-        At the end of the horizon, or of the part of it that STEPS allow and whose start is not forgotten, and not after
-        half of that.
+    Or of the part of the horizon that STEPS allow and whose start is not forgotten.
     """
     halves = {scene.duration / 2**k for k in range(HALVINGS + 1)}
     times = sorted(halves | {scene.duration * k / PARTS for k in range(1, PARTS)})

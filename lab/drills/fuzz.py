@@ -173,28 +173,10 @@ def _check(number: int, scene: Scene) -> Book:
 
 def run(seed: int, directory: Path, *, seconds: float | None = None, draws: int | None = None, first: int = 0,
         jobs: int = 1, memory: Kept | None = None, ordinary: float = ORDINARY) -> Book:
-    """Draw scenes until the time is over or enough are drawn; print what became of them, write those that fail.
+    """Draw scenes until the time in s is over or so many are drawn; None: that does not end the search.
 
-    Parameters
-    ----------
-    seed : int
-    directory : Path
-        Where scenes that fail are written as YAML.
-    seconds, draws : float in s, and int, optional
-        What ends the search; None: does not.
-    first : int
-        Number of the first draw.
-    jobs : int
-        Processes.
-    memory : Kept, optional
-        What it knows is not drawn again.
-    ordinary : float
-        Part of ordinary scenes among the draws.
-
-    Raises
-    ------
-    Refused
-        If a scene that fails cannot be written.
+    Prints what became of them, and writes those that fail as YAML into the directory. `first` is the number of the
+    first draw, `ordinary` the part of ordinary scenes; what `memory` knows is not drawn again.
     """
     begin, book = time.monotonic(), Book()
     with tqdm(total=draws, unit=" draws", desc="fuzz", file=sys.stderr) as bar:

@@ -49,16 +49,9 @@ class Reader(NamedTuple):
 
 
 def run(directory: Path, *, seed: int, first: int, count: int | None, seconds: float | None) -> int:
-    """Try damaged files until the count or the time is reached; returns how many broke a reader.
+    """Try damaged files until the count or the time in s is reached; returns how many broke a reader.
 
-    Parameters
-    ----------
-    directory : Path
-        Where the files that broke one are written.
-    seed, first : int
-        File k is the same in every run with the same seed.
-    count : int, optional
-    seconds : float, optional
+    These are written into the directory. File k is the same in every run with the same seed.
     """
     answers: Counter[tuple[str, str]] = Counter()
     slowest, end = dict.fromkeys(["scene", "result", "bag", "journal"], 0.0), time.monotonic() + (seconds or np.inf)

@@ -61,13 +61,7 @@ def ticks_of(run: Trajectory) -> Iterator[Tick]:
 
 
 def write(path: Path, run: Trajectory) -> None:
-    """Record a sampled run without a graph.
-
-    Raises
-    ------
-    BagError
-        If the bag cannot be written.
-    """
+    """Record a sampled run without a graph."""
     recorder = Recorder(path, run.scene, {})
     for tick in ticks_of(run):
         recorder.write_tick(*tick)

@@ -66,15 +66,8 @@ def examine(scene: Scene, every: bool = True, max_work: int = MOST_WORK, compare
             ) -> Examination:
     """Run a scene and check all properties that can be checked for it.
 
-    Parameters
-    ----------
-    scene : Scene
-    every : bool
-        Also those that take more runs and are not worth it for each of many scenes.
-    max_work : int
-        Budget of each run.
-    compare : bool
-        Also with the reference, if that takes no longer than some seconds.
+    With `every` also those that take more runs and are not worth it for each of many scenes; with `compare` also with
+    the reference, if that takes no longer than some seconds. `max_work` is the budget of each run.
     """
     product = Product(MOST_EVENTS, max_work)
     with np.errstate(over="ignore", invalid="ignore", under="ignore", divide="ignore"):

@@ -46,15 +46,8 @@ REFERENCE_SECONDS = 3.0
 def splitting(detail: Detail, part: float, product: Product) -> float:
     """A run restarted from an output, over the rest of its input interval, beside one from a state nudged a little.
 
-    Outputs beside an event are left out: `motion` compares them with the state at the event.
-
-    Parameters
-    ----------
-    detail : Detail
-    part : float
-        In [0, 1): which piece of the run begins anew.
-    product : Product
-        For its accuracy and budgets.
+    Outputs beside an event are left out: `motion` compares them with the state at the event. `part`, in [0, 1), says
+    which piece of the run begins anew; the product, with which accuracy and budgets.
     """
     first = int(part * len(detail.pieces.begin))
     pieces = slice(first, first + _alike(detail, first))

@@ -109,21 +109,10 @@ class Chaos(NamedTuple):
 
 
 def stretching(scene: Scene, seconds: float, push: Array) -> Array:
-    """Logarithms of how much a small perturbation grows in each interval of EVERY s (Benettin's method).
+    """Logarithms of how much a small perturbation, of this direction (6,), grows in each interval of EVERY s.
 
-    Two motions run side by side; after each interval their difference is scaled back to SMALL.
-
-    Parameters
-    ----------
-    scene : Scene
-    seconds : float, s
-    push : array (6,)
-        Direction of the perturbation.
-
-    References
-    ----------
-    G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Lyapunov characteristic exponents for smooth dynamical
-    systems, Meccanica 15 (1980).
+    Two motions run side by side; after each interval their difference is scaled back to SMALL: G. Benettin, L. Galgani,
+    A. Giorgilli, J.-M. Strelcyn, Lyapunov characteristic exponents for smooth dynamical systems, Meccanica 15 (1980).
     """
     weights, level = state_weights(scene.system), _level(scene)
     state, offset = scene.initial_state, _offset(scene, push)

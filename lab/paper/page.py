@@ -75,13 +75,7 @@ class Line(NamedTuple):
 
 
 def write_html(report: Report, path: Path) -> None:
-    """Write the page into one file that needs nothing else.
-
-    Raises
-    ------
-    Refused
-        If it cannot be written.
-    """
+    """Write the page into one file that needs nothing else."""
     runs = json.dumps(list(report.replays), separators=(",", ":")).replace("<", "\\u003c")
     pages.put(path, _render(
         "page.html", report, autoescape=True, css=Markup(_template("page.css")), js=Markup(_template("replay.js")),
@@ -91,13 +85,7 @@ def write_html(report: Report, path: Path) -> None:
 
 
 def write_markdown(report: Report, path: Path) -> None:
-    """Write the short page as Markdown, and beside it a table of all rows and a directory of figures.
-
-    Raises
-    ------
-    Refused
-        If it cannot be written.
-    """
+    """Write the short page as Markdown, and beside it a table of all rows and a directory of figures."""
     directory = path.parent / FIGURES
     with writing(directory):
         directory.mkdir(parents=True, exist_ok=True)

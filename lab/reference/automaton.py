@@ -23,12 +23,7 @@ class Event(NamedTuple):
 
 
 class Automaton(Motion):
-    """A motion that can change its modes, and remembers when.
-
-    Attributes
-    ----------
-    events : list of Event
-    """
+    """A motion that can change its modes, and remembers when."""
 
     def __init__(self, plant: Plant, x: Reals, v: Reals, tolerance: Real) -> None:
         super().__init__(plant, x, v, tolerance)

@@ -66,18 +66,10 @@ def titled(page: Path, title: str) -> str:
 
 
 def run(page: Path, directory: Path) -> list[Output]:
-    """Run all that a page shows, in its order.
+    """Run all that a page shows, in its order, with files in a directory that is empty.
 
-    Parameters
-    ----------
-    page : Path
-    directory : Path
-        Where files are written; empty.
-
-    Raises
-    ------
-    Exception
-        Whatever a script on the page raises; `subprocess.CalledProcessError` for a command that fails unexpectedly.
+    Raises whatever a script on the page raises, and `subprocess.CalledProcessError` for a command that fails
+    unexpectedly.
     """
     text = page.read_text(encoding="utf-8")
     found: list[Output] = []

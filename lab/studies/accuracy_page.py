@@ -38,21 +38,10 @@ RIVALS = {
 
 
 def run(docs: Path | None, directory: Path, quick: bool) -> None:
-    """Run all studies, as far as the journal does not have them, and write the page.
+    """Run all studies, as far as the journal in the directory does not have them, and write the page.
 
-    Parameters
-    ----------
-    docs : Path, optional
-        Directory of the page, default that of the journal; figures and records go to `accuracy` in it.
-    directory : Path
-        The journal.
-    quick : bool
-        Few settings on two short scenes, without the outside peers and without ROS.
-
-    Raises
-    ------
-    Refused
-        If a directory cannot be written.
+    Figures and records go to `accuracy` beside it; without `docs` all goes to the directory of the journal. `quick`:
+    few settings on two short scenes, without the outside peers and without ROS.
     """
     docs = docs or directory
     folder = docs / "accuracy"

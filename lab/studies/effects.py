@@ -60,13 +60,7 @@ class Cost(NamedTuple):
 
 
 def run(docs: Path | None) -> None:
-    """Print the page on costs, or write it with its figure into a directory of pages.
-
-    Raises
-    ------
-    Refused
-        If the page cannot be written.
-    """
+    """Print the page on costs, or write it with its figure into a directory of pages."""
     scene = scenes.load(SCENE)
     found = variants(scene)
     costs = measure(found)

@@ -64,13 +64,7 @@ class Other:
 
 
 def run(docs: Path | None, alone: bool) -> int:
-    """Print a row for each case; with a directory of pages, write the page there. Returns 1 if a case is wrong.
-
-    Raises
-    ------
-    Refused
-        If the page cannot be written.
-    """
+    """Print a row for each case; with a directory of pages, write the page there. Returns 1 if a case is wrong."""
     rows: list[Row] = []
     others = [] if alone else [Other(name, setting) for name, setting in OTHERS]
     for case in tqdm(cases(), desc="hard", file=sys.stderr):

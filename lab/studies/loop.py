@@ -47,13 +47,7 @@ class Point(NamedTuple):
 
 
 def run(scene: Scene, directory: Path, graph_periods: tuple[float, ...] = GRAPH_PERIODS_MS) -> list[Point]:
-    """Measure every period; resumes from the journal.
-
-    Raises
-    ------
-    RuntimeError
-        If a graph does not finish.
-    """
+    """Measure every period; resumes from the journal."""
     journal = Journal(directory)
     steps = round(scene.duration / COMMON_S)
     grid = np.linspace(0.0, scene.duration, steps + 1)

@@ -28,13 +28,7 @@ GAIN, LOSS = "Kp of both arms, N/m", "p of both contacts, s/m"
 
 
 def run(docs: Path | None, directory: Path, quick: bool) -> None:
-    """Compute what is not there yet, and write the page with its pictures.
-
-    Raises
-    ------
-    Refused
-        If a directory cannot be written.
-    """
+    """Compute what is not there yet, and write the page with its pictures."""
     docs = docs or directory
     folder = docs / "maps"
     with writing(folder):

@@ -58,15 +58,7 @@ def origin(family: str) -> str:
 class Journal:
     """Records on disk, one JSON line each, written as they are measured.
 
-    Parameters
-    ----------
-    directory : Path
-        Made if it does not exist.
-
-    Raises
-    ------
-    Refused
-        If the directory cannot be made or written, or holds a journal that is damaged.
+    The directory is made if it does not exist. Refused: it cannot be made or written, or its journal is damaged.
     """
 
     def __init__(self, directory: Path) -> None:
@@ -92,13 +84,7 @@ class Journal:
                 self._lines[entry["key"]] = entry["value"]
 
     def get(self, key: str, kind: type[T]) -> T | None:
-        """What was noted under a key; None if nothing was.
-
-        Raises
-        ------
-        Refused
-            If it is no record of this kind.
-        """
+        """What was noted under a key; None if nothing was. Refused: it is no record of this kind."""
         if key not in self._lines:
             return None
         hints = get_type_hints(kind)

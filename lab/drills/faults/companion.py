@@ -21,10 +21,7 @@ class Failed(Exception):  # noqa: N818 - a drill that could not take place
 class Companion:
     """The process of the fault injector, for one drill after the other.
 
-    Parameters
-    ----------
-    prefix : sequence of str
-        Words before its command line, which take it to another host.
+    A prefix of words before its command line takes it to another host.
     """
 
     def __init__(self, prefix: Sequence[str] = ()) -> None:
@@ -36,13 +33,7 @@ class Companion:
         self.pid = self._process.pid
 
     def ask(self, action: str, **words: Any) -> dict[str, Any]:
-        """Let it do something; returns its answer.
-
-        Raises
-        ------
-        Failed
-            If it cannot: nobody reads what it would send, or it has ended.
-        """
+        """Let it do something; returns its answer. Failed: nobody reads what it would send, or it has ended."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.write(json.dumps({"do": action, **words}) + "\n")

@@ -62,13 +62,7 @@ def group_rows(played: Sequence[Played]) -> list[list[str]]:
 
 
 def write(docs: Path, played: Sequence[Played]) -> None:
-    """Write the page, and the table of all drills beside it.
-
-    Raises
-    ------
-    Refused
-        If it cannot be written.
-    """
+    """Write the page, and the table of all drills beside it."""
     rows = [row(*pair) for pair in played]
     write_csv(HEADS, rows, docs / "faults.csv")
     failed = [words for words, (_, evidence) in zip(rows, played, strict=True)

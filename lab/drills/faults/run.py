@@ -30,13 +30,7 @@ def all_drills() -> list[Drill]:
 
 
 def chosen(names: Sequence[str], quick: bool) -> list[Drill]:
-    """Drills by their names, or those of `--quick`, or all.
-
-    Raises
-    ------
-    Refused
-        If there is no such drill.
-    """
+    """Drills by their names, or those of `--quick`, or all; refuses a name that there is not."""
     drills = all_drills()
     known = {drill.name for drill in drills}
     if unknown := sorted(set(names) - known):
@@ -47,13 +41,7 @@ def chosen(names: Sequence[str], quick: bool) -> list[Drill]:
 
 
 def run(drills: Sequence[Drill], docs: Path | None) -> bool:
-    """Play drills, print a row of each and write the page; returns whether all pass.
-
-    Raises
-    ------
-    Refused
-        If the page cannot be written, or no ROS domain is free.
-    """
+    """Play drills, print a row of each and write the page; returns whether all pass."""
     for number in (signal.SIGINT, signal.SIGQUIT):  # ignored in the background of a shell
         if signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler)

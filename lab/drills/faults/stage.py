@@ -38,15 +38,8 @@ MARK = "GRASP_DRILL"  # variable by which the processes of a drill are known, wh
 class Stage:
     """A directory, a domain, and the processes of one drill.
 
-    Parameters
-    ----------
-    folder : Path
-        New directory.
-    scene : Scene
-    companion : Companion
-    domain : int
-    seen : Topic, optional
-        By which ticks are counted: what the plant publishes, or what the monitor does once it has recorded a tick.
+    The directory is made. Ticks are counted by a topic: what the plant publishes, or what the monitor does once it has
+    recorded a tick.
     """
 
     def __init__(
@@ -197,13 +190,7 @@ class Stage:
         return True
 
     def settle(self) -> None:
-        """Wait until the graph is at work.
-
-        Raises
-        ------
-        Failed
-            If it does not get there.
-        """
+        """Wait until the graph is at work; raises Failed if it does not get there."""
         self.wait(lambda: self.published >= BEFORE or all(map(self.ended, self.started)), START_SECONDS)
         if self.published < BEFORE:
             raise Failed("; ".join(line.text for line in self.output.lines[-3:]) or "the graph does not start")

@@ -38,14 +38,8 @@ WALL = "wall"  # in place of a stamp in ns: the wall clock, as a header that fil
 class FaultInjector:
     """What happens in one domain.
 
-    Parameters
-    ----------
-    domain : int
-    times : path
-        Array of the file format of NumPy; entry k becomes the time, on the monotonic clock, at which tick k was seen.
-    period_ns : int
-    topic : str
-        Where it is looked for.
+    In the file of an array of NumPy entry k becomes the time, on the monotonic clock, at which tick k was seen on the
+    topic.
     """
 
     def __init__(self, domain: int, times: str, period_ns: int, topic: str) -> None:
