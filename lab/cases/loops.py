@@ -23,13 +23,9 @@ GROWN = 1e5  # by which each half of a run may grow, or decay
 LEAST = 1e-300  # J, against 0/0 where nothing moves
 
 
-def _case_01(period: float, ticks: int, added: Mapping[str, Mapping[str, Any]], **numbers: float) -> Scene:
-    values = {key: dict(content) for key, content in scenes.load("case_01").values.items()}
-    values["time"] = {"duration_s": round(period * ticks, 9), "control_period_s": period}
-    for name, number in numbers.items():
-        for side in ("left", "right"):
-            values[f"{side}_feedback"][name] = number
-    return scenes.compose("case_01", {**values, **{key: dict(content) for key, content in added.items()}})
+def _case_01(period: float, ticks: int, added: Mapping[str, Mapping[str, Any]]) -> Scene:
+    time = {"duration_s": round(period * ticks, 9), "control_period_s": period}
+    return scenes.compose("case_01", {**scenes.load("case_01").values, "time": time, **added})
 
 
 def _work(scene: Scene, product: Product) -> float:

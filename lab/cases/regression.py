@@ -27,6 +27,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene, SceneError
 from grasp_ros.simulation import simulate
+from lab.cases.case import Verdict
 from lab.oracles.rounding_bounds import largest, rates
 from lab.reference import integrate
 
@@ -50,13 +51,6 @@ class Answer(NamedTuple):
     amplification: list[float]  # what one rounding of each number of the scene has become, in roundings of the state
     events: int
     status: str = Status.DONE.name  # OUTSIDE: the motion leaves the domain, and the times end before
-
-
-class Verdict(NamedTuple):
-    """How the product ended: its status, and its error in roundings, see `verdict`; inf of a run that stopped."""
-
-    status: str
-    error: float
 
 
 def names() -> list[str]:
@@ -168,7 +162,7 @@ def _changes(scene: Scene, draw: np.random.Generator, part: float) -> dict[str, 
 
 
 def verdict(scene: Scene, right: Answer) -> Verdict:
-    """Run a scene and compare it with its answer.
+    """Run a scene and compare it with its answer; the error of a run that stopped is infinite.
 
     The error is relative to what one rounding explains: one of the state, and one of each number of the scene,
     amplified by the motion. So it is |x - right| / (EPS size (1 + amplification)), the largest over bodies, positions
@@ -177,16 +171,16 @@ def verdict(scene: Scene, right: Answer) -> Verdict:
     try:
         run = simulate(scene, grid=np.array([*right.t, scene.duration]), sampled=scene.sampled)
     except ArithmeticError as error:
-        return Verdict(type(error).__name__, np.inf)
+        return Verdict(np.inf, type(error).__name__)
     if run.status.name != right.status:
-        return Verdict(run.status.name, np.inf)
+        return Verdict(np.inf, run.status.name)
     there = [COLUMN[body] + k for body in scene.system.present for k in (0, 1)]
     worst = 0.0
     for state, row, amplification in zip(run.state, right.state, right.amplification, strict=False):
         size = _size(scene, row)
         errors = np.array([float(mpfr(row[i], 120) - float(state[i])) for i in there])
         worst = max(worst, float(_relative(errors, size[there]).max() / (EPS * (1.0 + amplification))))
-    return Verdict(run.status.name, worst if np.isfinite(worst) else np.inf)
+    return Verdict(worst if np.isfinite(worst) else np.inf, run.status.name)
 
 
 def main(chosen: Sequence[str]) -> int:

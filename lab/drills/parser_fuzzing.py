@@ -229,17 +229,13 @@ def _recover(right: Trajectory, kind: bytes, path: Path, folder: Path) -> None:
         raise Broken("other states are recovered")
 
 
-def _entry(key: str) -> dict[str, object]:
-    record = Record("s", "f", "m", "k", 1.0, None, 1.0, 1.0, 3, 1.0, None, 2, (1, 2), (3, 4), "done")
-    return {"key": key, "value": record._asdict()}
-
-
 def _seal(entry: object) -> str:
     return digest(entry["key"], json.dumps(entry["value"]))  # type: ignore[index]
 
 
 def _make_line(rng: Random) -> bytes:
-    entry = _entry("a")
+    record = Record("s", "f", "m", "k", 1.0, None, 1.0, 1.0, 3, 1.0, None, 2, (1, 2), (3, 4), "done")
+    entry = {"key": "a", "value": record._asdict()}
     if rng.integers(2):
         return mutations.line(entry, rng, _seal).encode()
     return mutations.damage((json.dumps({**entry, "sum": _seal(entry)}) + "\n").encode(), rng)

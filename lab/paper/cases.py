@@ -125,10 +125,9 @@ def value_of(scene: Scene, letter: str) -> float:
     return float(scene.values[section][key])
 
 
-def random_starts(number: int, seed: int = SEED) -> list[Start]:
+def random_starts(number: int) -> list[Start]:
     """Starts at rest, x_l in [-0.5, -0.1], x_o = 0, x_r in [0.1, 0.5] m."""
-    rng = np.random.default_rng(seed)
-    draws = rng.uniform(NEAREST, FARTHEST, (number, 2)).tolist()
+    draws = np.random.default_rng(SEED).uniform(NEAREST, FARTHEST, (number, 2)).tolist()
     return [Start(-x_l, x_r) for x_l, x_r in draws]
 
 

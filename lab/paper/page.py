@@ -21,8 +21,7 @@ from lab.paper.equation_table import Equation
 from lab.paper.equations import CROSSING
 from lab.paper.printed import PRINTED
 from lab.paper.prints import Compared
-from lab.paper.quantities import Uncertainties
-from lab.paper.results import Beyond, tables
+from lab.paper.results import Beyond, Uncertainties, tables
 from lab.studies import pages
 from lab.studies.records import write_csv
 

@@ -34,9 +34,8 @@ from lab.paper.equations import equations
 from lab.paper.measures import MEASURES
 from lab.paper.page import Picture, Report
 from lab.paper.prints import LETTERS, compared
-from lab.paper.quantities import quantities, uncertainties
 from lab.paper.replay import replays
-from lab.paper.results import Beyond
+from lab.paper.results import Beyond, quantities, uncertainties
 from lab.paper.statements import STATEMENTS
 
 RANDOM_STARTS = 200

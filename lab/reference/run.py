@@ -7,8 +7,7 @@ import math
 import gmpy2
 from gmpy2 import mpfr
 
-from lab.reference.automaton import Automaton
-from lab.reference.gaps import gaps
+from lab.reference.automaton import Automaton, gaps
 from lab.reference.motion import Pair
 from lab.reference.plant import OBJECT, SIDES, Plant, Real, Reals, State
 from lab.reference.roots import bound_at, first_crossing, value_at

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 import time
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -19,12 +20,26 @@ from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros.accuracy import measure
-from grasp_ros.accuracy.measure import NOT_INSTALLED, Contender, Record, Truth
+from grasp_ros.accuracy.measure import (
+    DONE,
+    NOT_INSTALLED,
+    Answer,
+    Contender,
+    Record,
+    Solve,
+    Truth,
+    own_contenders,
+)
+from grasp_ros.methods.equations import parameters
+from grasp_ros.methods.library import slopes
+from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import GRID_POINTS
 from lab.reference import integrate
 from lab.reference.deadline import Deadline, deadline
+from lab.studies import peer_heyoka, peer_sundials
 from lab.studies.records import Journal, origin, scene_key
 
 STANDARD = ("case_01", "case_02", "case_03", "case_04")
@@ -32,6 +47,7 @@ STIFF = ("case_01", 1e8)  # ten thousand times the paper's Hertz coefficient
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-11)
 DIGITS = 25
 LATE = "stopped: longer"
+MAX_STEPS = 10_000_000  # of odeint
 METRIC = (  # the label of every axis and column that shows `Record.error`
     f"largest absolute error over six states (m, m/s) and {GRID_POINTS} output times,"
     f" against a reference of {DIGITS} digits"
@@ -62,6 +78,33 @@ def default_scenes() -> list[Scene]:
     name, hertzian = STIFF
     stiff = scenes.load(name, [f"{side}_contact.hertz_N_per_m1_5={hertzian}" for side in ("left", "right")])
     return [*map(scenes.load, STANDARD), replace(stiff, name=f"{name}_H{hertzian:.0e}".replace("+0", ""))]
+
+
+def all_contenders(scene: Scene) -> list[Contender]:
+    """The methods of `grasp simulate` that can treat a scene, and the outside peers."""
+    own, _ = own_contenders(scene)
+    odeint = Contender("scipy", "odeint", "tolerance", METHODS["lsoda"].ladder, _odeint)
+    return [*own, odeint, *peer_sundials.contenders(), *peer_heyoka.contenders()]
+
+
+def _odeint(scene: Scene, tolerance: float) -> Solve:
+    """LSODA over everything, with its loop over the steps outside Python."""
+    from scipy.integrate import odeint
+
+    args = (parameters(scene.system), True, True)
+
+    def solve(grid: Array) -> Answer:
+        times = grid if grid[0] == 0.0 else np.concatenate([[0.0], grid])
+        with warnings.catch_warnings():  # an integration that fails says so in its status
+            warnings.simplefilter("ignore")
+            states, report = odeint(
+                slopes, scene.initial_state, times, args, rtol=tolerance, atol=tolerance, tfirst=True,
+                mxstep=MAX_STEPS, full_output=True,
+            )
+        status = DONE if report["message"] == "Integration successful." else report["message"]
+        return Answer(states[-len(grid) :], None, status, int(report["nst"][-1]), int(report["nfe"][-1]))
+
+    return solve
 
 
 def run(subjects: Sequence[Scene], directory: Path, effort: Effort, contenders: Sequence[Contender]) -> list[Record]:

@@ -18,7 +18,6 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
 from lab.reference.grasp import grasp_of
 from lab.studies import accuracy, drift, figures, loop, pages, predictability, speed, stability
-from lab.studies.contenders import all_contenders
 from lab.studies.drift import Drift
 from lab.studies.loop import Point
 from lab.studies.records import Journal, by_scene, milliseconds, write_records
@@ -52,7 +51,7 @@ def run(docs: Path | None, directory: Path, quick: bool) -> None:
     if quick:
         *subjects, case = (scene.changed({"time.duration_s": QUICK_S}) for scene in (*subjects[:2], case))
     records = accuracy.run(subjects, directory, accuracy.QUICK if quick else accuracy.FULL, [
-        contender for contender in all_contenders(case) if contender.family == OURS or not quick])
+        contender for contender in accuracy.all_contenders(case) if contender.family == OURS or not quick])
     drifts = drift.run(directory, *((QUICK_S, QUICK_DRIFT) if quick else (drift.SECONDS, None)))
     predictions = predictability.run(subjects, QUICK_S if quick else predictability.SECONDS)
     arm = grasp_of(case).left

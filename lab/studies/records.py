@@ -64,7 +64,6 @@ class Journal:
     def __init__(self, directory: Path) -> None:
         with writing(directory):
             directory.mkdir(parents=True, exist_ok=True)
-        self.directory = directory
         self._path = directory / "journal.jsonl"
         self._lines: dict[str, Any] = {}
         if self._path.exists():
@@ -147,13 +146,9 @@ def write_csv(heads: Sequence[str], rows: Iterable[Sequence[object]], path: Path
 
 def write_records(records: Iterable[Record], path: Path) -> None:
     """All records as a table with a header."""
-    write_csv([*Record._fields, "missed"], [
-        [*record._replace(found=_pair(record.found), there_are=_pair(record.there_are)), record.missed]  # type: ignore[arg-type]
-        for record in records], path)
-
-
-def _pair(pair: tuple[int, int] | None) -> str | None:
-    return None if pair is None else f"{pair[0]}/{pair[1]}"
+    rows = (["/".join(map(str, cell)) if isinstance(cell, tuple) else cell for cell in record] + [record.missed]
+            for record in records)
+    write_csv([*Record._fields, "missed"], rows, path)
 
 
 def by_scene(records: Iterable[Record]) -> dict[str, list[Record]]:

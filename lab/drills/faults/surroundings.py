@@ -18,9 +18,8 @@ from grasp_ros.graph import bag
 from grasp_ros.scene.topics import LEFT_COMMAND
 from grasp_ros.simulation import simulate
 from lab.drills import recorder
-from lab.drills.faults.drill import Drill, Skipped, play
+from lab.drills.faults.drill import Drill, Evidence, Skipped, play
 from lab.drills.faults.stage import NODES, Stage
-from lab.drills.faults.verdict import Evidence
 
 CHECKOUT = Path(__file__).parents[3]  # where `python -m lab` runs
 GROUP, NAMES, FILES = "terminal, disk and directory", "names and waiting", "files"
