@@ -109,12 +109,8 @@ def answer(scene: Scene) -> Answer:
     middle = max((k for k in range(last) if times[k] <= times[last] / 2), default=last)
     kept = sorted({middle, last})
     status = Status.DONE if len(small) == len(right.state) else Status.OUTSIDE
-    rows = [[_text(a) for a in small[k]] for k in kept]
+    rows = [[f"{a:.{DIGITS - 1}e}" for a in small[k]] for k in kept]
     return Answer([times[k] for k in kept], rows, [amplification[k] for k in kept], len(right.events), status.name)
-
-
-def _text(value: Any) -> str:
-    return f"{value:.{DIGITS - 1}e}"
 
 
 def _size(scene: Scene, row: Sequence[Any]) -> Array:

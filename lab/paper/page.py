@@ -17,9 +17,8 @@ from ruamel.yaml import YAML
 from grasp_ros.scene.files import writing
 from lab.paper import arms, beyond, cases, claims, equation_table, measures, scatter, universal
 from lab.paper.claims import Claim, Kind, Part, Verdict, tally
-from lab.paper.equation_table import Equation
+from lab.paper.equation_table import PRINTED, Equation
 from lab.paper.equations import CROSSING
-from lab.paper.printed import PRINTED
 from lab.paper.prints import Compared
 from lab.paper.results import Beyond, Uncertainties, tables
 from lab.studies import pages

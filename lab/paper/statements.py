@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from grasp_ros import scene as scenes
-from grasp_ros.scene import Scene
 from lab.paper import motion
 from lab.paper.arms import STEPS
 from lab.paper.cases import NUMBERS, Cases, Start, started
@@ -15,6 +14,7 @@ from lab.paper.universal import Found, Share, Universal, threshold
 
 EVERY = 10**6  # of the random starts
 LONG = 500.0  # s
+LONGER = ((f"No. 2 over {LONG:g} s", lambda cases: cases[2].changed({"time.duration_s": LONG})),)
 AFTER_27, AFTER_34 = "p. 245, after (27)", "p. 245, after (34)"
 ANY_P = "p", (0.1, 1.0, 10.0)
 ANY_H = "H", (1e2, 1e3, 1e5)
@@ -44,10 +44,6 @@ def _with_loss(*numbers: int) -> Comparison:
         "The term takes energy in impacts; where dampers take it sooner, little is left for it.",
         "p", (0.1, 0.2, 0.5, 1.0, 2.0, 5.0), ("settling_5", "rest"), others=(other,), pairs=tuple(pairs),
     )
-
-
-def _long(cases: Cases) -> Scene:
-    return cases[2].changed({"time.duration_s": LONG})
 
 
 RUNNING_TEXT = (
@@ -98,7 +94,7 @@ RUNNING_TEXT = (
     Statement("T11", "p. 246, method", "The method can follow any number of collisions: nothing limits it.", [
         *(Universal(f"With a step of {1e3 * step:g} ms it goes on to the end, however many touches come.",
                     motion.goes_on.of(step), "Every step determines the contacts anew; their number is not limited.",
-                    NUMBERS, "H", (1e2, 1e5), extra=((f"No. 2 over {LONG:g} s", _long),)) for step in STEPS),
+                    NUMBERS, "H", (1e2, 1e5), extra=LONGER) for step in STEPS),
         *(Universal(f"Read as: it finds every touch, with a step of {1e3 * step:g} ms.", motion.none_missed.of(step),
                     "Contact is detected at the ends of a step; contacts in between are missed. Above 1 the motion has"
                     " already diverged.", NUMBERS, "H", (1e2, 1e5), reading=True)

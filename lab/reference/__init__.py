@@ -12,7 +12,7 @@ impulse is below the accuracy, and only there.
     motion     state and modes
     automaton  what ends a mode, and transitions
     run        steps and outputs
-    solve      scenes
+    solve      scenes, and their derivatives
 """
 
 from lab.reference.solve import Reference, integrate

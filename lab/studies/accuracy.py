@@ -20,16 +20,7 @@ from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros.accuracy import measure
-from grasp_ros.accuracy.measure import (
-    DONE,
-    NOT_INSTALLED,
-    Answer,
-    Contender,
-    Record,
-    Solve,
-    Truth,
-    own_contenders,
-)
+from grasp_ros.accuracy.measure import DONE, NOT_INSTALLED, Answer, Contender, Record, Solve, Truth, own_contenders
 from grasp_ros.methods.equations import parameters
 from grasp_ros.methods.library import slopes
 from grasp_ros.methods.registry import METHODS

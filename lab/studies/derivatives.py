@@ -20,7 +20,7 @@ from grasp_ros.sensitivity.run import Carrier
 from grasp_ros.simulation import GRID_POINTS, simulate
 from grasp_ros.simulation.differentiate import complete, differentiate
 from lab.oracles.differences import DECIDED, WRONG, judge_draw
-from lab.reference.derivative import difference
+from lab.reference.solve import difference
 from lab.studies import pages, peer_derivatives
 from lab.studies.records import Journal, scene_key
 from lab.studies.speed import in_turn
