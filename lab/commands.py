@@ -131,18 +131,6 @@ def _filled(module: str, page: str, options: Options) -> int:
     return 0
 
 
-def _derivatives(options: Options) -> int:
-    from lab.studies import derivatives
-
-    prepare()
-    wanted = options.tables or [name for name in derivatives.TABLES if name != derivatives.PEERS]
-    found = derivatives.tables(wanted, options.output, options.draws)
-    print("\n\n".join(found.values()))
-    if options.docs is not None:
-        derivatives.write(options.docs, found)
-    return 0
-
-
 def _repeated(module: str, options: Options) -> int:
     """A drill that does the same to runs of one scene so many times."""
     drill = import_module(f"lab.drills.{module}")
@@ -194,7 +182,7 @@ COMMANDS = (
     Command("accuracy", "what accuracy costs: error against time of every method, energy, prediction, control periods;"
             " resumes", _study("accuracy_page", "docs", "output", "quick"), RESUMED, "accuracy"),
     Command("derivatives", "derivatives through impacts beside the reference, which takes hours and resumes, random"
-            " scenes, and peers", _derivatives, (
+            " scenes, and peers", _study("derivatives", "docs", "output", "tables", "draws"), (
                 _asked("--table", dest="tables", action="append", choices=("reference", "random", "peers", "cost"),
                        help="one of the page's tables; repeatable (default all but peers)"),
                 _asked("--draws", type=whole(1), default=300, metavar="N",

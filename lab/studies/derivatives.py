@@ -134,13 +134,16 @@ def states_alone(scene: Scene, keys: Sequence[str], times: Array) -> Array:
     return carrier.out
 
 
-def tables(names: list[str], directory: Path, decided: int) -> dict[str, str]:
-    """The named tables of the page, measured now."""
+def run(docs: Path | None, directory: Path, names: list[str] | None, decided: int) -> None:
+    """Measure and print the named tables, or all but the one of peers; with a directory of pages, write them there."""
     measures = {
         REFERENCE: lambda: reference(directory), RANDOM: lambda: random_scenes(decided),
         PEERS: lambda: peer_derivatives.report(peer_derivatives.run()), COST: cost,
     }
-    return {name: measures[name]() for name in names}
+    found = {name: measures[name]() for name in names or [name for name in TABLES if name != PEERS]}
+    print("\n\n".join(found.values()))
+    if docs is not None:
+        write(docs, found)
 
 
 def write(docs: Path, found: dict[str, str]) -> Path:

@@ -61,18 +61,14 @@ def claim(path: Path) -> None:
 
 
 def stamp() -> str:
-    """The sentence that every measured page carries: date, commit and machine."""
+    """The sentence that every measured page carries: date, commit and whether what is measured differs, machine."""
     machine = describe_machine()
     system, cpu = machine.pop("system"), machine.pop("cpu")
     versions = ", ".join(f"{name} {version}" for name, version in machine.items())
-    return f"Measured on {time.strftime('%Y-%m-%d')} from commit {_commit()}: {system}, {cpu}, {versions}."
-
-
-def _commit() -> str:
-    """The commit of this checkout, and whether what is measured differs from it."""
     commit = _git("rev-parse", "--short", "HEAD")
-    changed = commit and _git("status", "--porcelain", "--", *PRODUCT)
-    return f"{commit or 'unknown'}{' with changes' if changed else ''}"
+    changes = " with changes" if commit and _git("status", "--porcelain", "--", *PRODUCT) else ""
+    return (f"Measured on {time.strftime('%Y-%m-%d')} from commit {commit or 'unknown'}{changes}: {system}, {cpu},"
+            f" {versions}.")
 
 
 def _git(*words: str) -> str:
