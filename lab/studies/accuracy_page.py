@@ -17,11 +17,10 @@ from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
 from lab.reference.grasp import grasp_of
-from lab.studies import accuracy, drift, figures, loop, pages, predictability, speed, stability
+from lab.studies import accuracy, drift, figures, loop, pages, predictability, speed
 from lab.studies.drift import Drift
-from lab.studies.loop import Point
+from lab.studies.loop import Limit, Point
 from lab.studies.records import Journal, by_scene, milliseconds, write_records
-from lab.studies.stability import Limit
 
 LOOP_SCENE = "case_01"
 QUICK_S = 5.0
@@ -55,7 +54,7 @@ def run(docs: Path | None, directory: Path, quick: bool) -> None:
     drifts = drift.run(directory, *((QUICK_S, QUICK_DRIFT) if quick else (drift.SECONDS, None)))
     predictions = predictability.run(subjects, QUICK_S if quick else predictability.SECONDS)
     arm = grasp_of(case).left
-    limits = stability.limits(arm)
+    limits = loop.limits(arm)
     points = loop.run(case, directory, () if quick else loop.GRAPH_PERIODS_MS)
 
     write_records(records, folder / "records.csv")

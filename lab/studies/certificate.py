@@ -16,7 +16,7 @@ from grasp_ros.physics.model import Arm, Array, Contact
 from grasp_ros.physics.system import NAMES, System
 from grasp_ros.simulation import simulate
 from lab.reference.grasp import Grasp, system_of
-from lab.studies.stability import first_limit
+from lab.studies.loop import first_limit
 
 SCENES = ("v_jump_symmetric", "v_jump_one_sided", "v_jump_smallest_p")
 STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)

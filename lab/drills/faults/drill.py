@@ -204,7 +204,7 @@ def _read_words(evidence: Evidence, stage: Stage, begin: float, end: float) -> N
     """
     news = stage.output.news(begin, end)
     concerns = stage.companion.ask("concerns")["concerns"]
-    reports = [(when, f"/diagnostics of {name.lstrip('/')}: {words}") for name, (when, _, words) in concerns.items()
+    reports = [(when, f"/diagnostics of {name.lstrip('/')}: {words}") for name, (when, words) in concerns.items()
                if begin <= when <= end]
     times = [line.when for line in news] + [when for when, _ in reports]
     evidence.noticed = min(times, default=math.nan) - begin
