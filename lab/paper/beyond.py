@@ -135,9 +135,9 @@ def _offset(scene: Scene, push: Array) -> Array:
     return push / state_weights(scene.system) * (SMALL * _level(scene) / float(np.linalg.norm(push)))
 
 
-def chaos(cases: Cases, symmetric: Scene, seconds: float = CHAOS_SECONDS) -> Chaos:
+def chaos(cases: Cases, seconds: float = CHAOS_SECONDS) -> Chaos:
     """Lyapunov exponent and nearest return of case 2."""
-    scene = cases[2]
+    scene, symmetric = cases[2], started(cases[2], SYMMETRIC)
     push = np.random.default_rng(1990).normal(size=6)
     logs = stretching(scene, seconds, push)
     blocks = logs.reshape(BLOCKS, -1).sum(axis=1) / (seconds / BLOCKS)

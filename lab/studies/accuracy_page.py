@@ -52,7 +52,7 @@ def run(docs: Path | None, directory: Path, quick: bool) -> None:
     records = accuracy.run(subjects, directory, accuracy.QUICK if quick else accuracy.FULL, [
         contender for contender in accuracy.all_contenders(case) if contender.family == OURS or not quick])
     drifts = drift.run(directory, *((QUICK_S, QUICK_DRIFT) if quick else (drift.SECONDS, None)))
-    predictions = predictability.run(subjects, QUICK_S if quick else predictability.SECONDS)
+    predictions = [predictability.predict(scene, QUICK_S if quick else predictability.SECONDS) for scene in subjects]
     arm = grasp_of(case).left
     limits = loop.limits(arm)
     points = loop.run(case, directory, () if quick else loop.GRAPH_PERIODS_MS)

@@ -19,8 +19,7 @@ from lab.paper.claims import Check, Claim, Kind, Part, Verdict
 from lab.paper.equations import equations
 from lab.paper.measures import measure, seconds, settlings
 from lab.paper.prints import compared
-from lab.paper.replay import COLUMNS, frames, replays
-from lab.paper.results import quantities, uncertainties
+from lab.paper.results import COLUMNS, frames, quantities, replays, uncertainties
 from lab.paper.scatter import asymmetry, median, where_false
 from lab.paper.statements import STATEMENTS
 

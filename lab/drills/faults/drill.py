@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import os
 import re
@@ -10,7 +9,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
 from typing import NamedTuple
@@ -123,7 +122,7 @@ class Skipped(Exception):  # noqa: N818 - no error
 def play(drill: Drill, stage: Stage) -> Evidence:
     """Play a drill to its end; returns what is known then."""
     if drill.play is not None:
-        return dataclasses.replace(drill.play(stage), culprit=drill.culprit)
+        return replace(drill.play(stage), culprit=drill.culprit)
     drill.start(stage)
     if drill.settle:
         stage.settle()

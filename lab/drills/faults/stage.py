@@ -193,10 +193,9 @@ class Stage:
 
     def has(self, name: str) -> bool:
         """Whether a node runs."""
-        try:
+        with suppress(Failed):
             return self.pid(name) > 0
-        except Failed:
-            return False
+        return False
 
     def said(self, words: str) -> bool:
         """Whether somebody has printed these words."""
