@@ -48,14 +48,9 @@ class Output(NamedTuple):
         return doctest.OutputChecker().check_output(self.said, self.printed, COMPARE)
 
 
-def has_examples(text: str) -> bool:
-    """Whether anything on a page runs."""
-    return any(kind in ("python", "console", "sh") for kind, *_ in BLOCK.findall(text))
-
-
-def has_commands(text: str) -> bool:
-    """Whether a page starts processes, which takes a while."""
-    return any(kind in ("console", "sh") for kind, *_ in BLOCK.findall(text))
+def has_examples(text: str, kinds: Sequence[str] = ("python", "console", "sh")) -> bool:
+    """Whether anything on a page runs, of these kinds; all but `python` start processes, which takes a while."""
+    return any(kind in kinds for kind, *_ in BLOCK.findall(text))
 
 
 def titled(page: Path, title: str) -> str:
