@@ -76,18 +76,18 @@ def _paper(options: Options) -> int:
 
 def _fuzz(options: Options) -> int:
     from lab.cases import degenerate
-    from lab.drills import fuzz, random_scenes
+    from lab.drills import fuzz
     from lab.studies import pages
 
     seconds = _seconds(options.seconds, options.draws)
     ordinary = degenerate.ORDINARY if options.ordinary is None else options.ordinary
     pages.claim(options.output / "scene.yaml")
     prepare()
-    memory = None if options.docs is None else random_scenes.Kept(options.output, options.seed, ordinary)
+    memory = None if options.docs is None else fuzz.Kept(options.output, options.seed, ordinary)
     book = fuzz.run(options.seed, options.output, seconds=seconds, draws=options.draws, first=options.first,
                     jobs=options.jobs, memory=memory, ordinary=ordinary)
     if options.docs is not None:
-        random_scenes.write_page(options.docs, options.seed, options.first, book, ordinary)
+        fuzz.write_page(options.docs, options.seed, options.first, book, ordinary)
     return 1 if book.broken else 0
 
 
@@ -128,18 +128,6 @@ def _filled(module: str, page: str, options: Options) -> int:
     study = import_module(f"lab.studies.{module}")
     prepare()
     pages.write(options.docs, page, **study.numbers())
-    return 0
-
-
-def _derivatives(options: Options) -> int:
-    from lab.studies import derivatives
-
-    prepare()
-    wanted = options.tables or [name for name in derivatives.TABLES if name != derivatives.PEERS]
-    found = derivatives.tables(wanted, options.output, options.draws)
-    print("\n\n".join(found.values()))
-    if options.docs is not None:
-        derivatives.write(options.docs, found)
     return 0
 
 
@@ -194,7 +182,7 @@ COMMANDS = (
     Command("accuracy", "what accuracy costs: error against time of every method, energy, prediction, control periods;"
             " resumes", _study("accuracy_page", "docs", "output", "quick"), RESUMED, "accuracy"),
     Command("derivatives", "derivatives through impacts beside the reference, which takes hours and resumes, random"
-            " scenes, and peers", _derivatives, (
+            " scenes, and peers", _study("derivatives", "docs", "output", "tables", "draws"), (
                 _asked("--table", dest="tables", action="append", choices=("reference", "random", "peers", "cost"),
                        help="one of the page's tables; repeatable (default all but peers)"),
                 _asked("--draws", type=whole(1), default=300, metavar="N",

@@ -41,13 +41,7 @@ class Product:
     runs: list[Trajectory] = field(default_factory=list)  # all so far; a run that was stopped is there as far as it got
 
     def run(self, scene: Scene, times: Iterable[float] | None = None, sampled: bool = False) -> Trajectory:
-        """Simulate a scene to its end.
-
-        Raises
-        ------
-        Unfinished
-            If it ends with another status than DONE.
-        """
+        """Simulate a scene to its end; raises Unfinished if it ends with another status than DONE."""
         grid = None if times is None else np.array(list(times))
         result = simulate(scene, grid=grid, sampled=sampled, setting=self.accuracy, max_events=self.max_events,
                           max_work=self.max_work)

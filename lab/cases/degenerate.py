@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+import numpy as np
+
 from grasp_ros import scene as scenes
 from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene
@@ -28,16 +30,9 @@ def _wall(sketch: Sketch) -> None:
     sketch.mass[2 * side], sketch.springs[side][0], sketch.v[2 * side] = 1e9, 1e12, 0.0
 
 
-def _no_springs(sketch: Sketch) -> None:
-    sketch.springs = [[0.0, 0.0], [0.0, 0.0]]
-
-
-def _no_damping(sketch: Sketch) -> None:
-    sketch.dampers = [[0.0, 0.0], [0.0, 0.0]]
-
-
-def _elastic(sketch: Sketch) -> None:
-    sketch.loss = [0.0, 0.0]
+def _without(name: str) -> Callable[[Sketch], None]:
+    """Nothing of a kind on either side."""
+    return lambda sketch: setattr(sketch, name, np.zeros_like(getattr(sketch, name)).tolist())
 
 
 def _set_point(sketch: Sketch) -> None:
@@ -78,8 +73,8 @@ def _tilt(sketch: Sketch) -> None:
 
 
 DEGENERACIES: tuple[tuple[str, float, Callable[[Sketch], None]], ...] = (
-    ("same speed", 0.1, _same_speed), ("one wall", 0.06, _wall), ("no springs", 0.15, _no_springs),
-    ("no damping", 0.15, _no_damping), ("elastic", 0.1, _elastic), ("set-point", 0.25, _set_point),
+    ("same speed", 0.1, _same_speed), ("one wall", 0.06, _wall), ("no springs", 0.15, _without("springs")),
+    ("no damping", 0.15, _without("dampers")), ("elastic", 0.1, _without("loss")), ("set-point", 0.25, _set_point),
     ("feed-forward", 0.2, _feed_forward), ("tilt", 0.2, _tilt), ("friction", 0.25, _friction),
 )
 

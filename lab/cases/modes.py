@@ -13,16 +13,7 @@ from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene
 from lab.cases.case import Case, Solver, recorded
 from lab.cases.families import CLAMP, EXTREME, START
-from lab.cases.scenes import (
-    STANDARD,
-    contacts,
-    distance,
-    grasp,
-    library,
-    part,
-    reference,
-    reference_run,
-)
+from lab.cases.scenes import STANDARD, contacts, distance, grasp, library, part, reference, reference_run
 
 STARTS: dict[str, tuple[float, ...]] = {
     "in contact": (0.005, 0.3, 0.0, 0.0, 0.5, 0.0),

@@ -27,6 +27,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene, SceneError
 from grasp_ros.simulation import simulate
+from lab.cases.case import Verdict
 from lab.oracles.rounding_bounds import largest, rates
 from lab.reference import integrate
 
@@ -50,13 +51,6 @@ class Answer(NamedTuple):
     amplification: list[float]  # what one rounding of each number of the scene has become, in roundings of the state
     events: int
     status: str = Status.DONE.name  # OUTSIDE: the motion leaves the domain, and the times end before
-
-
-class Verdict(NamedTuple):
-    """How the product ended: its status, and its error in roundings, see `verdict`; inf of a run that stopped."""
-
-    status: str
-    error: float
 
 
 def names() -> list[str]:
@@ -98,13 +92,9 @@ def _known() -> dict[str, dict[str, Any]]:
 
 
 def answer(scene: Scene) -> Answer:
-    """Integrate a scene with DIGITS digits.
+    """Integrate a scene with DIGITS digits, at the end of the horizon and not after half of that.
 
-    Returns
-    -------
-    Answer
-        At the end of the horizon, or of the part of it that STEPS allow and whose start is not forgotten, and not after
-        half of that.
+    Or of the part of the horizon that STEPS allow and whose start is not forgotten.
     """
     halves = {scene.duration / 2**k for k in range(HALVINGS + 1)}
     times = sorted(halves | {scene.duration * k / PARTS for k in range(1, PARTS)})
@@ -119,12 +109,8 @@ def answer(scene: Scene) -> Answer:
     middle = max((k for k in range(last) if times[k] <= times[last] / 2), default=last)
     kept = sorted({middle, last})
     status = Status.DONE if len(small) == len(right.state) else Status.OUTSIDE
-    rows = [[_text(a) for a in small[k]] for k in kept]
+    rows = [[f"{a:.{DIGITS - 1}e}" for a in small[k]] for k in kept]
     return Answer([times[k] for k in kept], rows, [amplification[k] for k in kept], len(right.events), status.name)
-
-
-def _text(value: Any) -> str:
-    return f"{value:.{DIGITS - 1}e}"
 
 
 def _size(scene: Scene, row: Sequence[Any]) -> Array:
@@ -172,7 +158,7 @@ def _changes(scene: Scene, draw: np.random.Generator, part: float) -> dict[str, 
 
 
 def verdict(scene: Scene, right: Answer) -> Verdict:
-    """Run a scene and compare it with its answer.
+    """Run a scene and compare it with its answer; the error of a run that stopped is infinite.
 
     The error is relative to what one rounding explains: one of the state, and one of each number of the scene,
     amplified by the motion. So it is |x - right| / (EPS size (1 + amplification)), the largest over bodies, positions
@@ -181,16 +167,16 @@ def verdict(scene: Scene, right: Answer) -> Verdict:
     try:
         run = simulate(scene, grid=np.array([*right.t, scene.duration]), sampled=scene.sampled)
     except ArithmeticError as error:
-        return Verdict(type(error).__name__, np.inf)
+        return Verdict(np.inf, type(error).__name__)
     if run.status.name != right.status:
-        return Verdict(run.status.name, np.inf)
+        return Verdict(np.inf, run.status.name)
     there = [COLUMN[body] + k for body in scene.system.present for k in (0, 1)]
     worst = 0.0
     for state, row, amplification in zip(run.state, right.state, right.amplification, strict=False):
         size = _size(scene, row)
         errors = np.array([float(mpfr(row[i], 120) - float(state[i])) for i in there])
         worst = max(worst, float(_relative(errors, size[there]).max() / (EPS * (1.0 + amplification))))
-    return Verdict(run.status.name, worst if np.isfinite(worst) else np.inf)
+    return Verdict(worst if np.isfinite(worst) else np.inf, run.status.name)
 
 
 def main(chosen: Sequence[str]) -> int:

@@ -1,7 +1,11 @@
-"""Random scenes against all properties, for as long as wanted; each is drawn again from a seed and its number."""
+"""Random scenes against all properties, for as long as wanted; each is drawn again from a seed and its number.
+
+The page says what a search has counted, and a journal keeps it, so that the search can go on.
+"""
 
 from __future__ import annotations
 
+import json
 import multiprocessing
 import re
 import sys
@@ -14,19 +18,20 @@ from dataclasses import dataclass, field
 from functools import partial
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from tqdm import tqdm
 
+from grasp_ros.exact.compilation.kernel_cache import sources_digest
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
+from grasp_ros.scene.versions import versions
 from lab.cases.degenerate import ORDINARY, draw_scene
 from lab.cases.draw import inside
 from lab.oracles.properties import Check, Examination, examine
-
-if TYPE_CHECKING:
-    from lab.drills.random_scenes import Kept
+from lab.studies import pages
+from lab.studies.records import Journal, digest
 
 CHUNK = 50  # draws that a process does at once
 TABLES = {  # headers
@@ -34,6 +39,8 @@ TABLES = {  # headers
     "degeneracies": ["degeneracy", "drawn", "failures"],
 }
 COMPARED = 5000  # every how many scenes one is compared with the reference
+# what a draw depends on beside the kernels and the physics
+ROOMS = "grasp_ros/scene", "grasp_ros/simulation", "lab/reference", "lab/cases", "lab/oracles"
 
 
 @dataclass
@@ -98,6 +105,37 @@ class Book:
         print(f"failures: {self.broken}")
 
 
+class Line(NamedTuple):
+    """The book of a chunk of draws in the journal."""
+
+    book: str  # JSON
+
+
+class Kept:
+    """The books of all chunks that were drawn with these sources, in the journal of a directory."""
+
+    def __init__(self, directory: Path, seed: int, ordinary: float = ORDINARY) -> None:
+        sources = (path.read_text("utf-8") for room in ROOMS for path in sorted((pages.HOME / room).rglob("*.py")))
+        self._journal = Journal(directory)
+        self._name = digest(seed, ordinary, sources_digest(), *sources, *versions().items())
+
+    def _key(self, numbers: range) -> str:
+        return f"{self._name} {numbers.start} {numbers.stop}"
+
+    def get(self, numbers: range) -> Book | None:
+        """What became of these draws, if that is known."""
+        line = self._journal.get(self._key(numbers), Line)
+        if line is None:
+            return None
+        ends, tallies, degeneracies, broken, scenes = json.loads(line.book).values()
+        return Book(Counter(ends), {name: Tally(**tally) for name, tally in tallies.items()}, Counter(degeneracies),
+                    Counter(broken), {int(number): yaml for number, yaml in scenes.items()})
+
+    def put(self, numbers: range, book: Book) -> None:
+        """Keep what became of these draws."""
+        self._journal.put(self._key(numbers), Line(json.dumps(vars(book), default=vars)))
+
+
 def _ordered(counts: Counter[str]) -> list[tuple[str, int]]:
     return sorted(counts.items(), key=lambda item: (-item[1], item[0]))
 
@@ -135,28 +173,10 @@ def _check(number: int, scene: Scene) -> Book:
 
 def run(seed: int, directory: Path, *, seconds: float | None = None, draws: int | None = None, first: int = 0,
         jobs: int = 1, memory: Kept | None = None, ordinary: float = ORDINARY) -> Book:
-    """Draw scenes until the time is over or enough are drawn; print what became of them, write those that fail.
+    """Draw scenes until the time in s is over or so many are drawn; None: that does not end the search.
 
-    Parameters
-    ----------
-    seed : int
-    directory : Path
-        Where scenes that fail are written as YAML.
-    seconds, draws : float in s, and int, optional
-        What ends the search; None: does not.
-    first : int
-        Number of the first draw.
-    jobs : int
-        Processes.
-    memory : Kept, optional
-        What it knows is not drawn again.
-    ordinary : float
-        Part of ordinary scenes among the draws.
-
-    Raises
-    ------
-    Refused
-        If a scene that fails cannot be written.
+    Prints what became of them, and writes those that fail as YAML into the directory. `first` is the number of the
+    first draw, `ordinary` the part of ordinary scenes; what `memory` knows is not drawn again.
     """
     begin, book = time.monotonic(), Book()
     with tqdm(total=draws, unit=" draws", desc="fuzz", file=sys.stderr) as bar:
@@ -209,3 +229,11 @@ def _write(directory: Path, seed: int, number: int, yaml: str, bar: Any) -> None
         directory.mkdir(parents=True, exist_ok=True)
         path.write_text(yaml, encoding="utf-8")
     bar.write(f"{yaml.splitlines()[0]}; scene in {path}", file=sys.stderr)
+
+
+def write_page(docs: Path, seed: int, first: int, book: Book, ordinary: float = ORDINARY) -> None:
+    """Write the page of random scenes: what was counted."""
+    source = f"--seed {seed}" + ("" if ordinary == ORDINARY else f" --ordinary {ordinary:g}")
+    failures = [[f"`{source} --first {number} --draws 1`", yaml.splitlines()[0].split(": ", 1)[1]]
+                for number, yaml in sorted(book.scenes.items())]
+    pages.write(docs, "fuzz", source=source, first=first, draws=book.ends.total(), failures=failures, **book.tables())

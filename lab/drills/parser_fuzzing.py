@@ -49,16 +49,9 @@ class Reader(NamedTuple):
 
 
 def run(directory: Path, *, seed: int, first: int, count: int | None, seconds: float | None) -> int:
-    """Try damaged files until the count or the time is reached; returns how many broke a reader.
+    """Try damaged files until the count or the time in s is reached; returns how many broke a reader.
 
-    Parameters
-    ----------
-    directory : Path
-        Where the files that broke one are written.
-    seed, first : int
-        File k is the same in every run with the same seed.
-    count : int, optional
-    seconds : float, optional
+    These are written into the directory. File k is the same in every run with the same seed.
     """
     answers: Counter[tuple[str, str]] = Counter()
     slowest, end = dict.fromkeys(["scene", "result", "bag", "journal"], 0.0), time.monotonic() + (seconds or np.inf)
@@ -236,17 +229,13 @@ def _recover(right: Trajectory, kind: bytes, path: Path, folder: Path) -> None:
         raise Broken("other states are recovered")
 
 
-def _entry(key: str) -> dict[str, object]:
-    record = Record("s", "f", "m", "k", 1.0, None, 1.0, 1.0, 3, 1.0, None, 2, (1, 2), (3, 4), "done")
-    return {"key": key, "value": record._asdict()}
-
-
 def _seal(entry: object) -> str:
     return digest(entry["key"], json.dumps(entry["value"]))  # type: ignore[index]
 
 
 def _make_line(rng: Random) -> bytes:
-    entry = _entry("a")
+    record = Record("s", "f", "m", "k", 1.0, None, 1.0, 1.0, 3, 1.0, None, 2, (1, 2), (3, 4), "done")
+    entry = {"key": "a", "value": record._asdict()}
     if rng.integers(2):
         return mutations.line(entry, rng, _seal).encode()
     return mutations.damage((json.dumps({**entry, "sum": _seal(entry)}) + "\n").encode(), rng)

@@ -61,13 +61,7 @@ def ticks_of(run: Trajectory) -> Iterator[Tick]:
 
 
 def write(path: Path, run: Trajectory) -> None:
-    """Record a sampled run without a graph.
-
-    Raises
-    ------
-    BagError
-        If the bag cannot be written.
-    """
+    """Record a sampled run without a graph."""
     recorder = Recorder(path, run.scene, {})
     for tick in ticks_of(run):
         recorder.write_tick(*tick)
@@ -77,7 +71,6 @@ def write(path: Path, run: Trajectory) -> None:
 class Kill(NamedTuple):
     """A recording that was killed."""
 
-    written: int  # ticks
     read: int  # ticks that are in the bag
     recovered: int  # ticks in the bag that `recover` made of it
     lost: float  # s of wall time before the kill from which nothing is there
@@ -106,7 +99,7 @@ def kill(scene: Scene, ticks: list[Tick], after: float) -> Kill:
         lost = 0.0 if read >= len(done) else end - float(done[read])
         new = Path(directory) / "new"
         saved = recover(path, new).ticks if read else 0
-        return Kill(len(done), read, saved, lost)
+        return Kill(read, saved, lost)
 
 
 def _count(path: Path) -> int:

@@ -129,10 +129,7 @@ class Plant:
 def steer(plant: Plant, calls: int, seed: int, quiet: bool = True) -> Counter[str]:
     """Call services at random, and leave the plant paused; returns how often each was called, and refused.
 
-    Raises
-    ------
-    Wrong
-        At the first call that has another effect than it promises.
+    Raises Wrong at the first call that has another effect than it promises.
     """
     draw, done = random.Random(seed), Counter[str]()
     for _ in tqdm(range(calls), unit="call", disable=quiet):
@@ -221,11 +218,7 @@ def steered(scene: Scene, directory: Path) -> Iterator[Plant]:
 def problems(path: Path, lengths: Sequence[int]) -> list[str]:
     """What is wrong with the bag of a run that was steered; nothing, if all is right.
 
-    Parameters
-    ----------
-    path : Path
-    lengths : sequence of int
-        Ticks that it must have from each beginning of the scene on.
+    `lengths` are the ticks that it must have from each beginning of the scene on.
     """
     recording = bag.read(path)
     verification, found = verify(recording), []

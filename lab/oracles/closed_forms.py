@@ -191,22 +191,12 @@ NODES = 40
 
 def balance(system: System, duration: float, events: Sequence[float], solve: Callable[[Array], Array],
             parts: int = 16) -> Balance:
-    """O3 along one trajectory with continuous feedback.
+    """O3 along one trajectory with continuous feedback, from the times of all events.
 
     m_l v_l + m_o v_o + m_r v_r + sum of C x + integral of sum of (K x - f) is constant, and so is V_c + 2 W with W' the
     dissipation. Between events the integrands are analytic after t = middle - half cos(theta), because u^(3/2) becomes
-    theta^3 times an analytic function; Gauss and Legendre do the rest. Long flights are cut into parts.
-
-    Parameters
-    ----------
-    system : System
-    duration : float, s
-    events : sequence of float, s
-        Times of all events.
-    solve : callable
-        From ascending times to states (n, 6).
-    parts : int
-        Of each segment between events; many where bodies swing fast within one.
+    theta^3 times an analytic function; Gauss and Legendre do the rest. Each segment is cut into parts, many where
+    bodies swing fast within one. `solve` gives states (n, 6) at ascending times.
     """
     bodies = system.closed_loop
     edges = sorted({0.0, duration, *events})

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.exact.integrator import Status
-from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Of, Transition, Work
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Of, Work
 from grasp_ros.physics.model import penetration
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene, SceneError
@@ -20,7 +20,7 @@ from grasp_ros.simulation import Trajectory
 from lab.cases.case import Product, Unfinished
 from lab.oracles.metamorphic import mirror, scaling
 from lab.oracles.motion import ledgers
-from lab.oracles.replay import findings
+from lab.oracles.replay import AFTER, BEFORE, findings
 from lab.oracles.restart_check import digits, reversal, splitting
 from lab.oracles.rounding_bounds import DIED_OUT
 from lab.oracles.segments import Detail, Pieces, cut, detail, grid_of, pieces_of
@@ -66,15 +66,8 @@ def examine(scene: Scene, every: bool = True, max_work: int = MOST_WORK, compare
             ) -> Examination:
     """Run a scene and check all properties that can be checked for it.
 
-    Parameters
-    ----------
-    scene : Scene
-    every : bool
-        Also those that take more runs and are not worth it for each of many scenes.
-    max_work : int
-        Budget of each run.
-    compare : bool
-        Also with the reference, if that takes no longer than some seconds.
+    With `every` also those that take more runs and are not worth it for each of many scenes; with `compare` also with
+    the reference, if that takes no longer than some seconds. `max_work` is the budget of each run.
     """
     product = Product(MOST_EVENTS, max_work)
     with np.errstate(over="ignore", invalid="ignore", under="ignore", divide="ignore"):
@@ -205,20 +198,9 @@ def states(run: Trajectory) -> list[Check]:
     broken = 0
     for side in (LEFT, RIGHT, OBJECT):
         kinds = [event.kind for event in run.events if event.side == side]
-        broken += sum(not _may_follow(before, after) for before, after in pairwise(kinds))
+        broken += sum(not any(AFTER[one] is mode for mode in BEFORE[other]) for one, other in pairwise(kinds))
     times = run.event_table[:, 0]
     return [
         Check("finite", float(np.count_nonzero(~np.isfinite(run.state[:, there]))), 0.0),
         Check("order of events", float(np.count_nonzero(np.diff(times) < -EPS * times[1:]) + broken), 0.0),
     ]
-
-
-def _may_follow(before: Transition, after: Transition) -> bool:
-    """Whether one pair can change like this."""
-    allowed = {
-        Transition.TOUCH: (Transition.RELEASE, Transition.CLAMP),
-        Transition.REENTRY: (Transition.RELEASE, Transition.CLAMP),
-        Transition.CLAMP: (Transition.REENTRY, Transition.RELEASE), Transition.RELEASE: (Transition.TOUCH,),
-        Transition.STICK: (Transition.SLIP,), Transition.SLIP: (Transition.STICK,),
-    }
-    return after in allowed[before]

@@ -13,12 +13,12 @@ from grasp_ros.physics.model import Array
 from lab.oracles.rounding_bounds import TINY, Impacts, accelerations, impacts, push_noise, sizes
 from lab.oracles.segments import Detail
 
-BEFORE: dict[Transition, tuple[int, ...]] = {  # modes that an event ends
+BEFORE: dict[Transition, tuple[Pair | Slide, ...]] = {  # modes that an event ends
     Transition.TOUCH: (Pair.OPEN,), Transition.RELEASE: (Pair.CONTACT, Pair.CLAMPED),
     Transition.CLAMP: (Pair.CONTACT,), Transition.REENTRY: (Pair.CLAMPED,),
     Transition.STICK: (Slide.FREE,), Transition.SLIP: (Slide.STUCK,),
 }
-AFTER: dict[Transition, int] = {
+AFTER: dict[Transition, Pair | Slide] = {
     Transition.TOUCH: Pair.CONTACT, Transition.RELEASE: Pair.OPEN, Transition.CLAMP: Pair.CLAMPED,
     Transition.REENTRY: Pair.CONTACT, Transition.STICK: Slide.STUCK, Transition.SLIP: Slide.FREE,
 }

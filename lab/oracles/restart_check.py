@@ -46,15 +46,8 @@ REFERENCE_SECONDS = 3.0
 def splitting(detail: Detail, part: float, product: Product) -> float:
     """A run restarted from an output, over the rest of its input interval, beside one from a state nudged a little.
 
-    Outputs beside an event are left out: `motion` compares them with the state at the event.
-
-    Parameters
-    ----------
-    detail : Detail
-    part : float
-        In [0, 1): which piece of the run begins anew.
-    product : Product
-        For its accuracy and budgets.
+    Outputs beside an event are left out: `motion` compares them with the state at the event. `part`, in [0, 1), says
+    which piece of the run begins anew; the product, with which accuracy and budgets.
     """
     first = int(part * len(detail.pieces.begin))
     pieces = slice(first, first + _alike(detail, first))
@@ -63,7 +56,9 @@ def splitting(detail: Detail, part: float, product: Product) -> float:
     scale = sizes(detail)
     whole, size = _rows(detail.x[pieces], detail.v[pieces]), _rows(scale.x[first], scale.v[first])[0]
     moves = np.where(NUDGE * size > UNDERFLOW, size, 0.0)  # what rests stays at rest
-    again, *nudged = (_restart(detail, first, whole[0] + nudge * moves * pattern, times - start, product)
+    base = detail.run.scene.system.bodies if detail.run.sampled else detail.run.scene.system.closed_loop
+    inputs = detail.bodies[first, :, Of.FORCE] - base[:, Of.FORCE]
+    again, *nudged = (_go(detail.run, whole[0] + nudge * moves * pattern, inputs, times - start, product)
                       for nudge, pattern in ((0.0, PATTERN), (NUDGE, PATTERN), (-NUDGE, PATTERN), (NUDGE, OTHER)))
     grown = np.max([np.abs(other - again) for other in nudged], axis=0) * (EPS / NUDGE)
     reached = np.abs(whole)
@@ -143,14 +138,8 @@ def _alike(detail: Detail, first: int) -> int:
     return 1 + (int(broken.argmax()) if broken.any() else len(broken))
 
 
-def _restart(detail: Detail, piece: int, state: Array, offsets: Array, product: Product) -> Array:
-    """States at offsets from the begin of a piece, from another state, under the inputs of the piece."""
-    run = detail.run
-    base = run.scene.system.bodies if run.sampled else run.scene.system.closed_loop
-    return _go(run, state, detail.bodies[piece, :, Of.FORCE] - base[:, Of.FORCE], offsets, product)
-
-
 def _go(run: Trajectory, state: Array, inputs: Array, offsets: Array, product: Product) -> Array:
+    """States at offsets in time from another state, under inputs that are held."""
     system = replace(run.scene.system, state=state)
     integrator = Integrator(system, continuous=not run.sampled, accuracy=product.accuracy,
                             max_events=product.max_events, max_work=product.max_work)

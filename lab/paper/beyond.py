@@ -1,4 +1,7 @@
-"""What the paper could not show: the gap in its proof, the tail of the motion, and case 2 as chaos."""
+"""What the paper could not show: the gap in its proof, the tail of the motion, case 2 as chaos, and symmetric starts.
+
+A symmetric start is a knife-edge, from which the smallest offset leads away.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,8 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, simulate
 from lab.oracles.closed_forms import tail_rate
-from lab.paper.cases import Cases
+from lab.paper.cases import SYMMETRIC, Cases, moved, started
+from lab.paper.measures import measure
 from lab.paper.motion import distance_of_states, nearest_return, state_weights
 from lab.reference.grasp import grasp_of
 from lab.studies.certificate import SCENES, Jump, jumps, safe_p
@@ -27,6 +31,11 @@ CHAOS_SECONDS = 1000.0
 RETURN_SECONDS = 2000.0
 WITHIN = 200.0  # s, how long an offset across the symmetry is followed
 BLOCKS = 10  # of the time, for the standard error of the exponent
+EVEN_CASES = (1, 2, 5, 7, 8)  # both arms equal: what the paper starts symmetrically, and Nos. 1 and 2 from there
+SMALLEST = 1e-9  # m, the offset of x_l(0) whose growth is followed
+VISIBLE = 1e-3  # m
+MOVED = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)  # m, offsets behind which settling times are compared
+EDGE_SECONDS, EDGE_POINTS = 60.0, 12_001
 
 
 class Gap(NamedTuple):
@@ -100,21 +109,10 @@ class Chaos(NamedTuple):
 
 
 def stretching(scene: Scene, seconds: float, push: Array) -> Array:
-    """Logarithms of how much a small perturbation grows in each interval of EVERY s (Benettin's method).
+    """Logarithms of how much a small perturbation, of this direction (6,), grows in each interval of EVERY s.
 
-    Two motions run side by side; after each interval their difference is scaled back to SMALL.
-
-    Parameters
-    ----------
-    scene : Scene
-    seconds : float, s
-    push : array (6,)
-        Direction of the perturbation.
-
-    References
-    ----------
-    G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Lyapunov characteristic exponents for smooth dynamical
-    systems, Meccanica 15 (1980).
+    Two motions run side by side; after each interval their difference is scaled back to SMALL: G. Benettin, L. Galgani,
+    A. Giorgilli, J.-M. Strelcyn, Lyapunov characteristic exponents for smooth dynamical systems, Meccanica 15 (1980).
     """
     weights, level = state_weights(scene.system), _level(scene)
     state, offset = scene.initial_state, _offset(scene, push)
@@ -137,9 +135,9 @@ def _offset(scene: Scene, push: Array) -> Array:
     return push / state_weights(scene.system) * (SMALL * _level(scene) / float(np.linalg.norm(push)))
 
 
-def chaos(cases: Cases, symmetric: Scene, seconds: float = CHAOS_SECONDS) -> Chaos:
+def chaos(cases: Cases, seconds: float = CHAOS_SECONDS) -> Chaos:
     """Lyapunov exponent and nearest return of case 2."""
-    scene = cases[2]
+    scene, symmetric = cases[2], started(cases[2], SYMMETRIC)
     push = np.random.default_rng(1990).normal(size=6)
     logs = stretching(scene, seconds, push)
     blocks = logs.reshape(BLOCKS, -1).sum(axis=1) / (seconds / BLOCKS)
@@ -158,3 +156,37 @@ def _apart(scene: Scene, push: Array) -> tuple[Array, Array]:
     grid = np.linspace(0.0, 60.0, 6001)
     starts = scene.initial_state, scene.initial_state + _offset(scene, push)
     return grid, distance_of_states(scene, *(states_from(scene, start, grid) for start in starts)) / _level(scene)
+
+
+class Edge(NamedTuple):
+    """One case from the symmetric start, and from starts beside it."""
+
+    case: int
+    t: Array  # (n,), s
+    apart: Array  # (n,), m: how far from symmetric, the larger of |x_l + x_r| and |x_o|, after SMALLEST
+    rest: float  # m, the same without an offset: the largest
+    visible: float  # s, when it first exceeds VISIBLE; infinite: not within EDGE_SECONDS
+    settling: tuple[float, ...]  # s, for each of MOVED
+
+    @property
+    def rate(self) -> float:
+        """Mean rate of growth up to VISIBLE in 1/s; nan where it does not grow so far."""
+        return float(np.log(VISIBLE / SMALLEST) / self.visible) if np.isfinite(self.visible) else float("nan")
+
+
+def knife_edge(cases: Cases) -> list[Edge]:
+    """All symmetric cases, from a symmetric start and from beside it."""
+    return [_edge(number, started(cases[number], SYMMETRIC)) for number in EVEN_CASES]
+
+
+def _edge(number: int, scene: Scene) -> Edge:
+    t: Array = np.linspace(0.0, EDGE_SECONDS, EDGE_POINTS)
+    apart = _asymmetry(moved(scene, -SMALLEST), t)
+    above = np.flatnonzero(apart > VISIBLE)
+    return Edge(number, t, apart, float(_asymmetry(scene, t).max()), float(t[above[0]]) if len(above) else float("inf"),
+                tuple(measure(moved(scene, -offset), "settling") for offset in MOVED))
+
+
+def _asymmetry(scene: Scene, t: Array) -> Array:
+    state = simulate(scene.changed({"time.duration_s": EDGE_SECONDS}), grid=t).state
+    return np.asarray(np.maximum(np.abs(state[:, 0] + state[:, 4]), np.abs(state[:, 2])))

@@ -19,10 +19,9 @@ from grasp_ros.scene import Scene
 from grasp_ros.simulation import canvas, simulate
 from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, V_COLOR, shade_contacts
 from lab.paper.arms import STEPS, Damped, Stiffer
-from lab.paper.beyond import Chaos, Gap, Tail
+from lab.paper.beyond import MOVED, SMALLEST, Chaos, Edge, Gap, Tail
 from lab.paper.compare import wholly
 from lab.paper.figures import PAGE, STYLE
-from lab.paper.knife_edge import MOVED, SMALLEST, Edge
 from lab.paper.scatter import Median
 
 WIDE = (PAGE, 3.0)
@@ -222,11 +221,6 @@ def sweeps(curves: Sequence[Curve]) -> Drawing:
     return figure
 
 
-def _side(point: Median, higher: bool) -> str:
-    """On which side of 1 a whole interval lies, by the margin of the verdicts."""
-    return STATED if wholly(point, higher) else OTHER if wholly(point, not higher) else NEITHER
-
-
 def _sweep(axes: Axes, each: Curve) -> None:
     x, found = zip(*each.points, strict=True)
     y = [point.middle for point in found]
@@ -236,7 +230,8 @@ def _sweep(axes: Axes, each: Curve) -> None:
     finite = np.clip(y, 1e-3, 1e3)
     axes.loglog(x, finite, "-", color="black", linewidth=0.6)
     for value, point in each.points:
-        color, mark, face = POINTS[_side(point, each.higher)]
+        side = STATED if wholly(point, each.higher) else OTHER if wholly(point, not each.higher) else NEITHER
+        color, mark, face = POINTS[side]
         middle, low, high = np.clip([point.middle, point.low, point.high], 1e-3, 1e3)
         axes.errorbar(value, middle, [[middle - low], [high - middle]], fmt=mark, color=color, markersize=4.5,
                       markerfacecolor=face, capsize=3.0, elinewidth=1.3, capthick=1.3, zorder=3)

@@ -11,8 +11,7 @@ from grasp_ros.scene import Scene
 from lab.paper.cases import ALIKE, STANDARD, Cases, Start, read_starts, start_of, started, value_of, with_values
 from lab.paper.claims import ALMOST_ALL, HALF, Check, Kind, Part
 from lab.paper.measures import MARGIN, MEASURES, near, over, ratio, seconds
-from lab.paper.scatter import Median, median
-from lab.paper.symmetry import where_false
+from lab.paper.scatter import Median, median, where_false
 
 
 class Variant(NamedTuple):

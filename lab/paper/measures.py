@@ -58,13 +58,7 @@ _KNOWN: dict[tuple[str, str], dict[Start, Any]] = {}  # by a scene but for its s
 
 
 def over(scene: Scene, starts: Sequence[Start], name: str) -> list[float]:
-    """A measure of a scene from many starts, or what is remembered of it; a time behind LIMIT is infinite.
-
-    Raises
-    ------
-    RuntimeError
-        If a run does not reach its end.
-    """
+    """A measure of a scene from many starts, or what is remembered of it; a time behind LIMIT is infinite."""
     kind = "settling" if name == "swings" else _MOTION if name in Motion._fields else name
     known = _KNOWN.setdefault((text_of(scene, start=False), kind), {})
     missing = [start for start in dict.fromkeys(starts) if start not in known]

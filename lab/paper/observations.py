@@ -30,11 +30,7 @@ def tenfold(letter: str, *more: float) -> tuple[str, tuple[float, ...]]:
     return times(letter, 2.0, 3.0, 5.0, 10.0, 20.0, *more)
 
 
-def _without_own_springs(cases: Cases) -> Scene:
-    return with_values(cases[1], {"k": 0.0, "c": 0.0})
-
-
-ALONE = (("k = c = 0: the feedback alone holds the arms", _without_own_springs),)
+ALONE = (("k = c = 0: the feedback alone holds the arms", lambda cases: with_values(cases[1], {"k": 0.0, "c": 0.0})),)
 JUMPING = (
     ("scene v_jump_symmetric, p = 10", lambda _: scenes.load("v_jump_symmetric")),
     ("scene v_jump_one_sided, p = 15", lambda _: scenes.load("v_jump_one_sided")),

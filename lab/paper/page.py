@@ -15,14 +15,12 @@ from markupsafe import Markup
 from ruamel.yaml import YAML
 
 from grasp_ros.scene.files import writing
-from lab.paper import arms, beyond, cases, claims, equation_table, knife_edge, measures, scatter, universal
+from lab.paper import arms, beyond, cases, claims, equation_table, measures, scatter, universal
 from lab.paper.claims import Claim, Kind, Part, Verdict, tally
-from lab.paper.equation_table import Equation
+from lab.paper.equation_table import PRINTED, Equation
 from lab.paper.equations import CROSSING
-from lab.paper.printed import PRINTED
 from lab.paper.prints import Compared
-from lab.paper.results import Beyond, tables
-from lab.paper.uncertainties import Uncertainties
+from lab.paper.results import Beyond, Uncertainties, tables
 from lab.studies import pages
 from lab.studies.records import write_csv
 
@@ -31,7 +29,7 @@ TEMPLATES = Path(__file__).with_name("templates")
 FIGURES = "paper"  # directory of the figures beside the Markdown page
 NUMBERED = "P", "C"  # letters of the claims that the paper numbers
 WORDS = {  # what `words.yaml` names beside the fields of a report
-    "math": math, "arms": arms, "beyond": beyond, "cases": cases, "edge": knife_edge, "measures": measures,
+    "math": math, "arms": arms, "beyond": beyond, "cases": cases, "measures": measures,
     "rule": claims, "scatter": scatter, "table": equation_table, "universal": universal, "kinds": Kind,
     "verdicts": Verdict, "steps": arms.STEPS, "never": math.inf, "crossing": CROSSING, "tally": tally,
 }
@@ -75,13 +73,7 @@ class Line(NamedTuple):
 
 
 def write_html(report: Report, path: Path) -> None:
-    """Write the page into one file that needs nothing else.
-
-    Raises
-    ------
-    Refused
-        If it cannot be written.
-    """
+    """Write the page into one file that needs nothing else."""
     runs = json.dumps(list(report.replays), separators=(",", ":")).replace("<", "\\u003c")
     pages.put(path, _render(
         "page.html", report, autoescape=True, css=Markup(_template("page.css")), js=Markup(_template("replay.js")),
@@ -91,13 +83,7 @@ def write_html(report: Report, path: Path) -> None:
 
 
 def write_markdown(report: Report, path: Path) -> None:
-    """Write the short page as Markdown, and beside it a table of all rows and a directory of figures.
-
-    Raises
-    ------
-    Refused
-        If it cannot be written.
-    """
+    """Write the short page as Markdown, and beside it a table of all rows and a directory of figures."""
     directory = path.parent / FIGURES
     with writing(directory):
         directory.mkdir(parents=True, exist_ok=True)

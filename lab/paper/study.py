@@ -15,31 +15,15 @@ from tqdm import tqdm
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.simulation import canvas, simulate
 from lab.paper import arms, beyond, beyond_figures, figures
-from lab.paper.cases import (
-    FIGURES,
-    SYMMETRIC,
-    UNIT_OF,
-    Cases,
-    Figure,
-    Start,
-    load_cases,
-    random_starts,
-    start_of,
-    started,
-    value_of,
-)
+from lab.paper.cases import FIGURES, UNIT_OF, Cases, Figure, Start, load_cases, random_starts, start_of, value_of
 from lab.paper.claims import Claim
 from lab.paper.compare import Comparison
 from lab.paper.equations import equations
-from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import MEASURES
 from lab.paper.page import Picture, Report
 from lab.paper.prints import LETTERS, compared
-from lab.paper.quantities import quantities
-from lab.paper.replay import replays
-from lab.paper.results import Beyond
+from lab.paper.results import Beyond, quantities, replays, uncertainties
 from lab.paper.statements import STATEMENTS
-from lab.paper.uncertainties import uncertainties
 
 RANDOM_STARTS = 200
 DPI = 220
@@ -54,7 +38,7 @@ def report(starts: int) -> Report:
     context = multiprocessing.get_context("spawn")
     with context.Pool(os.cpu_count() or 1) as pool, tqdm(total=len(STATEMENTS) + len(jobs), file=sys.stderr) as bar:
         asked = {key: pool.apply_async(function, of) for key, (function, *of) in jobs.items()}
-        pictured = {key: pool.apply_async(_drawn, of) for key, of in drawings.items()}
+        pictured = {key: pool.apply_async(image, of) for key, of in drawings.items()}
         for each in STATEMENTS.values():  # here: what one measures the next one remembers
             bar.set_description(f"random starts and sweeps of {each.key}")
             claims.append(each.judge(cases, drawn))
@@ -65,9 +49,9 @@ def report(starts: int) -> Report:
             bar.update()
         found = Beyond(**{key: done.pop(key) for key in Beyond._fields})
         own = {key: (getattr(beyond_figures, key), numbers) for key, numbers in found._asdict().items()}
-        pictured |= {key: pool.apply_async(_drawn, of) for key, of in own.items() if key not in pictured}
+        pictured |= {key: pool.apply_async(image, of) for key, of in own.items() if key not in pictured}
         images = {key: answer.get() for key, answer in pictured.items()}
-    images["sweeps"] = image(beyond_figures.sweeps(_curves(cases, claims)))
+    images["sweeps"] = image(beyond_figures.sweeps, _curves(cases, claims))
     pictures = [picture(figure, cases, claims) for figure in FIGURES]
     return Report(starts, claims, pictures, found=found, images=images, **done)
 
@@ -75,9 +59,9 @@ def report(starts: int) -> Report:
 def _jobs(cases: Cases, drawn: list[Start]) -> Jobs:
     """What the paper lacks, the longest first, and the tables of the page."""
     return {
-        "chaos": (beyond.chaos, cases, started(cases[2], SYMMETRIC)), "stiffer": (arms.stiffer, cases, drawn),
+        "chaos": (beyond.chaos, cases), "stiffer": (arms.stiffer, cases, drawn),
         "damped": (arms.damped, cases, drawn), "gap": (beyond.gap, cases), "tail": (beyond.tail, cases[1]),
-        "stepped": (arms.stepped, cases), "edge": (knife_edge, cases), "equations": (equations, cases),
+        "stepped": (arms.stepped, cases), "edge": (beyond.knife_edge, cases), "equations": (equations, cases),
         "quantities": (quantities, cases), "uncertainties": (uncertainties, cases), "replays": (replays, cases),
     }
 
@@ -88,13 +72,9 @@ def _drawings(cases: Cases) -> Jobs:
             **{f"fig_{each.number:02d}": (figures.large, each, cases) for each in FIGURES}}
 
 
-def _drawn(draw: Callable[..., Any], *of: Any) -> bytes:
-    return image(draw(*of))
-
-
-def image(drawing: Any) -> bytes:
-    """A figure as a PNG file with a palette, which is a third as large."""
-    large, small = io.BytesIO(), io.BytesIO()
+def image(draw: Callable[..., Any], *of: Any) -> bytes:
+    """What is drawn as a PNG file with a palette, which is a third as large."""
+    drawing, large, small = draw(*of), io.BytesIO(), io.BytesIO()
     with canvas.style(figures.STYLE):
         drawing.savefig(large, format="png", dpi=DPI)
     with PIL.Image.open(large) as picture:

@@ -10,10 +10,9 @@ impulse is below the accuracy, and only there.
     roots      polynomials and their first roots
     series     Taylor series of a mode
     motion     state and modes
-    gaps       what ends a mode
-    automaton  transitions
+    automaton  what ends a mode, and transitions
     run        steps and outputs
-    solve      scenes
+    solve      scenes, and their derivatives
 """
 
 from lab.reference.solve import Reference, integrate

@@ -30,22 +30,7 @@ class Slide(Enum):
 
 
 class Motion:
-    """State and modes.
-
-    Parameters
-    ----------
-    plant : Plant
-    x, v : lists (3,) of mpfr, m and m/s
-        By body, at t = 0.
-    tolerance : mpfr
-        Relative size of what is left out.
-
-    Attributes
-    ----------
-    state : State
-    pairs : list of Pair
-    slide : Slide, or None without dry friction
-    """
+    """State and modes, from x and v by body at t = 0; `tolerance` is the relative size of what is left out."""
 
     def __init__(self, plant: Plant, x: Reals, v: Reals, tolerance: Real) -> None:
         self.plant, self.tolerance = plant, tolerance

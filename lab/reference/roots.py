@@ -58,8 +58,6 @@ def _search(row: Reals, depth: int) -> Real | None:
     end = sum(row)
     if row[0] > sum(map(abs, row[1:])):
         return None
-    if len(row) == 1:
-        return None
     if abs(row[1]) > sum(k * abs(a) for k, a in enumerate(row) if k > 1):
         return None if row[1] > 0 or end > 0 else _newton(row)
     if depth == 0:

@@ -7,8 +7,7 @@ import math
 import gmpy2
 from gmpy2 import mpfr
 
-from lab.reference.automaton import Automaton
-from lab.reference.gaps import gaps
+from lab.reference.automaton import Automaton, gaps
 from lab.reference.motion import Pair
 from lab.reference.plant import OBJECT, SIDES, Plant, Real, Reals, State
 from lab.reference.roots import bound_at, first_crossing, value_at
@@ -35,24 +34,10 @@ def precision(digits: int) -> int:
 
 
 class Run(Automaton):
-    """One integration; within a context of `precision(digits)`.
+    """One integration with outputs at ascending times; within a context of `precision(digits)`.
 
-    Parameters
-    ----------
-    plant, x, v
-        See `Motion`.
-    outputs : list of mpfr, s
-        Ascending times.
-    digits : int
-        Each step keeps this many, and some more.
-    budget : float
-        Limit of steps.
-
-    Attributes
-    ----------
-    rows : list of tuple
-        States at the outputs reached.
-    steps : int
+    Each step keeps so many digits, and some more; `budget` is the limit of steps. `rows` are the states at the outputs
+    reached.
     """
 
     def __init__(self, plant: Plant, x: Reals, v: Reals, outputs: Reals, digits: int, budget: float) -> None:
@@ -67,12 +52,8 @@ class Run(Automaton):
     def advance(self, end: Real) -> None:
         """Go on to a time.
 
-        Raises
-        ------
-        Spent
-            If the steps are used up; what was reached stays.
-        RuntimeError
-            If the modes contradict each other.
+        Raises Spent if the steps are used up, and what was reached stays; RuntimeError if the modes contradict each
+        other.
         """
         still = 0
         while self.state.t < end:

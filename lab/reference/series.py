@@ -60,17 +60,7 @@ def expand(plant: Plant, state: State, moving: Sequence[int], wall: bool, presse
            rooted: Sequence[int], order: int) -> Expansion:
     """Series of the time, of all bodies that move and of the pressed pairs.
 
-    Parameters
-    ----------
-    plant : Plant
-    state : State
-    moving : sequence of int
-        Bodies that take part.
-    wall : bool
-        Whether the object takes part as a wall.
-    pressed, rooted : sequences of int
-        Sides whose impact force acts, and those of them whose w is in the clock.
-    order : int
+    The object may take part as a wall. Rooted are those of the pressed sides whose w is in the clock.
     """
     zero = mpfr(0)
     x: list[Reals] = [[], [], []]

@@ -1,9 +1,10 @@
-"""The motions of scenes in high precision."""
+"""The motions of scenes in high precision, and their derivatives by differences."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from fractions import Fraction
 from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
@@ -14,11 +15,16 @@ from gmpy2 import mpfr
 from numpy.typing import NDArray
 
 from grasp_ros.physics.control import is_due
+from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
 from lab.reference.automaton import Event
 from lab.reference.plant import LEFT, OBJECT, RIGHT, Body, Law, Plant, Real, Reals, number
 from lab.reference.run import EXPONENTS, Row, Run, Spent, precision
+
+STEP = 2.0**-50  # of a number, whose neighbours are 2^-53 to 2^-52 of it apart
+FROM_ZERO = 2.0**-60  # the step of a number that is 0, whose neighbours are as near as one likes
+DIGITS = 25
 
 
 class Reference(NamedTuple):
@@ -50,12 +56,7 @@ def _reference(grid: Reals, run: Run) -> Reference:
     return Reference(grid[: len(run.rows)], run.rows, touches, releases, run.events)
 
 
-def _by_body(start: Reals) -> tuple[Reals, Reals]:
-    """Positions and velocities in the order of the bodies."""
-    return [start[0], start[4], start[2]], [start[1], start[5], start[3]]
-
-
-def integrate(scene: Scene, times: Iterable[Real], digits: int = 25, budget: float = math.inf,
+def integrate(scene: Scene, times: Iterable[Real], digits: int = DIGITS, budget: float = math.inf,
               state: Sequence[Real] | None = None, decimal: bool = False) -> Reference:
     """The motion of a scene in high precision.
 
@@ -86,8 +87,8 @@ def integrate(scene: Scene, times: Iterable[Real], digits: int = 25, budget: flo
     with gmpy2.context(precision=precision(digits), emax=EXPONENTS, emin=-EXPONENTS):
         grid, system = [exact(t) for t in times], scene.system
         plant = _plant(scene, exact)
-        start = [exact(value) for value in (system.state.tolist() if state is None else state)]
-        run = Run(plant, *_by_body(start), grid, digits, budget)
+        x_l, v_l, x_o, v_o, x_r, v_r = map(exact, system.state.tolist() if state is None else state)
+        run = Run(plant, [x_l, x_r, x_o], [v_l, v_r, v_o], grid, digits, budget)
         commands: Reals = [mpfr(0)] * 3
         waiting = [commands] * system.delay
         try:
@@ -145,3 +146,53 @@ def _commands(scene: Scene, tick: int, run: Run, last: Reals) -> Reals:
         if is_due(law.row, tick):
             forces[side] = number(law.command(tick, run.state.x[side], run.state.v[side]))
     return forces
+
+
+class Derivative(NamedTuple):
+    """Derivatives by one number, at fixed times; those of the times of contacts by side.
+
+    They are empty where the two motions have not as many: mirror images, say.
+    """
+
+    state: Array  # (m, 6)
+    touches: tuple[list[float], list[float]]  # s
+    releases: tuple[list[float], list[float]]
+
+
+def difference(scene: Scene, key: str, times: Sequence[float]) -> Derivative:
+    """Central differences, or one-sided ones of a number at 0 that cannot be negative, extrapolated to a step of 0.
+
+    Those of two steps are, one of them twice the other (L. F. Richardson, Phil. Trans. R. Soc. A 210 (1911) 307): where
+    a motion grows by 1e11, even the smallest step of a float is too long for one difference.
+    """
+    section, _, name = key.partition(".")
+    value = scene.values[section][name]
+    step = STEP * 2.0 ** round(math.log2(abs(value))) if value else FROM_ZERO
+    central = value != 0.0 or "position" in name or "velocity_m" in name or "set_point" in name
+    with gmpy2.context(precision=4 * DIGITS):
+        near, far = (_slopes(scene, key, times, value - width if central else value, value + width)
+                     for width in (step, 2.0 * step))
+        order = 2 if central else 1  # of the error in the step
+        *state, left, right, later_left, later_right = _pairwise(lambda a, b: a + (a - b) / (2**order - 1), near, far)
+    return Derivative(np.array(state, dtype=float), _floats(left, right), _floats(later_left, later_right))
+
+
+def _slopes(scene: Scene, key: str, times: Sequence[float], low: float, high: float) -> list[Reals]:
+    """Differences of states, one after another, and of the times of touches and releases, left and right."""
+    first, second = (
+        (*run.state, *run.touches, *run.releases)
+        for run in (integrate(scene.changed({key: at}), times, DIGITS) for at in (low, high)))
+    width = gmpy2.mpq(Fraction(high) - Fraction(low))
+    return _pairwise(lambda a, b: (b - a) / width, first, second)
+
+
+def _pairwise(
+    combine: Callable[[Real, Real], Real], first: Iterable[Sequence[Real]], second: Iterable[Sequence[Real]],
+) -> list[Reals]:
+    """Combine the numbers of two sequences of lists; those of unequal lengths make an empty one."""
+    return [[combine(a, b) for a, b in zip(*pair, strict=True)] if len(pair[0]) == len(pair[1]) else []
+            for pair in zip(first, second, strict=True)]
+
+
+def _floats(left: Reals, right: Reals) -> tuple[list[float], list[float]]:
+    return [float(value) for value in left], [float(value) for value in right]

@@ -48,14 +48,9 @@ class Output(NamedTuple):
         return doctest.OutputChecker().check_output(self.said, self.printed, COMPARE)
 
 
-def has_examples(text: str) -> bool:
-    """Whether anything on a page runs."""
-    return any(kind in ("python", "console", "sh") for kind, *_ in BLOCK.findall(text))
-
-
-def has_commands(text: str) -> bool:
-    """Whether a page starts processes, which takes a while."""
-    return any(kind in ("console", "sh") for kind, *_ in BLOCK.findall(text))
+def has_examples(text: str, kinds: Sequence[str] = ("python", "console", "sh")) -> bool:
+    """Whether anything on a page runs, of these kinds; all but `python` start processes, which takes a while."""
+    return any(kind in kinds for kind, *_ in BLOCK.findall(text))
 
 
 def titled(page: Path, title: str) -> str:
@@ -66,18 +61,10 @@ def titled(page: Path, title: str) -> str:
 
 
 def run(page: Path, directory: Path) -> list[Output]:
-    """Run all that a page shows, in its order.
+    """Run all that a page shows, in its order, with files in a directory that is empty.
 
-    Parameters
-    ----------
-    page : Path
-    directory : Path
-        Where files are written; empty.
-
-    Raises
-    ------
-    Exception
-        Whatever a script on the page raises; `subprocess.CalledProcessError` for a command that fails unexpectedly.
+    Raises whatever a script on the page raises, and `subprocess.CalledProcessError` for a command that fails
+    unexpectedly.
     """
     text = page.read_text(encoding="utf-8")
     found: list[Output] = []

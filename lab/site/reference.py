@@ -17,7 +17,6 @@ from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Mode
 from grasp_ros.scene import topics
 from grasp_ros.scene.effects import EFFECTS
-from grasp_ros.scene.effects.base import Effect
 from lab import __main__ as laboratory
 from lab.studies.pages import table
 
@@ -69,7 +68,7 @@ def scene_keys() -> str:
         " and `readings`, a list of texts that say where its numbers come from, and may have `watch`, a text.",
         "A *live* key may be set while the graph runs; an *optional* one may be left out.",
     ]
-    for effect in filter(_has_no_twin, EFFECTS):
+    for effect in [effect for effect in EFFECTS if not effect.section.startswith(TWINS)]:
         needs = f" Needs {', '.join(f'`{name}`' for name in effect.needs)}." if effect.needs else ""
         rows = [(f"`{own.key}`", own.unit, own.allowed, " ".join(
             word for word, holds in (("optional", own.optional), ("live", own.live)) if holds), own.text)
@@ -78,10 +77,6 @@ def scene_keys() -> str:
         parts += [table(("key", "unit", "allowed", "", "meaning"), rows)] if rows else []
     found = [(f"`{name}`", scenes.load(name).title) for name in scenes.names()]
     return "\n\n".join([*parts, "## Scenes of the package", table(("name", "title"), found)])
-
-
-def _has_no_twin(effect: Effect) -> bool:
-    return not effect.section.startswith(TWINS)
 
 
 def commands() -> str:

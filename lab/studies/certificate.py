@@ -16,7 +16,7 @@ from grasp_ros.physics.model import Arm, Array, Contact
 from grasp_ros.physics.system import NAMES, System
 from grasp_ros.simulation import simulate
 from lab.reference.grasp import Grasp, system_of
-from lab.studies.stability import first_limit
+from lab.studies.loop import first_limit
 
 SCENES = ("v_jump_symmetric", "v_jump_one_sided", "v_jump_smallest_p")
 STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)
@@ -64,13 +64,7 @@ def families() -> list[Family]:
 
 
 def jumps(system: System, duration: float) -> list[Jump]:
-    """All jumps of the paper's V in a run with continuous feedback, from the events alone: (4/5) H u^(5/2) each.
-
-    Raises
-    ------
-    RuntimeError
-        If the run does not reach its end.
-    """
+    """All jumps of the paper's V in a run with continuous feedback, from the events alone: (4/5) H u^(5/2) each."""
     integrator = Integrator(system, continuous=True)
     integrator.advance(duration)
     if integrator.status is not Status.DONE:
@@ -118,11 +112,6 @@ def search(family: Family, draws: int, steps: int, seed: int) -> Found:
     """Random starts, then random steps around the best one that only accept a smaller p.
 
     It proves that a jump exists at the p that it returns. That none exists below is proved only up to `safe_p`.
-
-    Raises
-    ------
-    ValueError
-        If no start that was drawn has a jump.
     """
     rng = np.random.default_rng(seed)
     low, high = np.array(family.low), np.array(family.high)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -10,14 +12,18 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros import scene as scenes
+from grasp_ros.exact.integrator import Integrator
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.simulation import simulate
-from grasp_ros.simulation.differentiate import differentiate
+from grasp_ros.sensitivity.directions import directions
+from grasp_ros.sensitivity.run import Carrier
+from grasp_ros.simulation import GRID_POINTS, simulate
+from grasp_ros.simulation.differentiate import complete, differentiate
 from lab.oracles.differences import DECIDED, WRONG, judge_draw
-from lab.reference.derivative import difference
-from lab.studies import derivative_cost, pages, peer_derivatives
+from lab.reference.solve import difference
+from lab.studies import pages, peer_derivatives
 from lab.studies.records import Journal, scene_key
+from lab.studies.speed import in_turn
 
 P, PLACE = "left_contact.dissipation_s_per_m", "object.position_m"
 SUBJECTS = (
@@ -28,6 +34,14 @@ SUBJECTS = (
 PARTS = (0.25, 0.5, 1.0)  # of the horizon
 SECONDS = {"delay": 3.0}  # horizons of scenes with many ticks, which take the reference long
 ROUNDINGS = 4  # runs whose initial positions are off by one
+NUMBERS = [
+    f"{side}_{number}" for side in ("left", "right") for number in (
+        "arm.mass_kg", "arm.stiffness_N_per_m", "arm.damping_Ns_per_m", "contact.hertz_N_per_m1_5",
+        "contact.dissipation_s_per_m", "feedback.position_gain_N_per_m",
+    )
+]
+TIMED = ("case_01", "tilt_hold", "preload")  # many impacts, and grasps that come to rest early
+ROUNDS = 80
 PAGE = "derivatives.md"
 REFERENCE, RANDOM, PEERS, COST = TABLES = "reference", "random", "peers", "cost"
 
@@ -93,13 +107,43 @@ def random_scenes(decided: int) -> str:
     return pages.table(("result", "scenes"), [[head, str(counts[head])] for head in heads])
 
 
-def tables(names: list[str], directory: Path, decided: int) -> dict[str, str]:
-    """The named tables of the page, measured now."""
+def cost() -> str:
+    """Runs with derivatives, as multiples of the same run without: the least times of the processor, in turn."""
+    rows = [_cost_row(scenes.load(name), count) for name in TIMED for count in (1, GRID_POINTS)]
+    heads = ("scene", "output times", "`simulate`, ms", "states by 1 number", "by 12", "`sensitivity` by 1", "by 12")
+    return pages.table(heads, rows)
+
+
+def _cost_row(scene: Scene, count: int) -> list[str]:
+    """Times of a scene with so many output times, the last one at its end."""
+    times = np.linspace(0.0, scene.duration, count + 1)[1:]
+    without, *others = map(min, in_turn([
+        partial(simulate, scene, grid=times),
+        *(partial(states_alone, scene, NUMBERS[:chosen], times) for chosen in (1, len(NUMBERS))),
+        *(partial(simulate, scene, grid=times, sensitivity=NUMBERS[:chosen]) for chosen in (1, len(NUMBERS))),
+    ], ROUNDS, time.thread_time))
+    return [scene.name, f"{count}", f"{1e3 * without:.2f}", *(f"{seconds / without:.1f}" for seconds in others)]
+
+
+def states_alone(scene: Scene, keys: Sequence[str], times: Array) -> Array:
+    """Derivatives (m, 6, n) of the states alone: one run."""
+    integrator = Integrator(scene.system, continuous=True)
+    carrier = Carrier(scene, integrator, directions(scene, keys, False), times, False)
+    complete(scene, integrator, False, times)
+    carrier.finish()
+    return carrier.out
+
+
+def run(docs: Path | None, directory: Path, names: list[str] | None, decided: int) -> None:
+    """Measure and print the named tables, or all but the one of peers; with a directory of pages, write them there."""
     measures = {
         REFERENCE: lambda: reference(directory), RANDOM: lambda: random_scenes(decided),
-        PEERS: lambda: peer_derivatives.report(peer_derivatives.run()), COST: derivative_cost.run,
+        PEERS: lambda: peer_derivatives.report(peer_derivatives.run()), COST: cost,
     }
-    return {name: measures[name]() for name in names}
+    found = {name: measures[name]() for name in names or [name for name in TABLES if name != PEERS]}
+    print("\n\n".join(found.values()))
+    if docs is not None:
+        write(docs, found)
 
 
 def write(docs: Path, found: dict[str, str]) -> Path:

@@ -51,13 +51,7 @@ class Row(NamedTuple):
 
 
 def run(docs: Path | None) -> int:
-    """Print a row for each scene; with a directory of pages, write the page there. Returns 1 if one is not explained.
-
-    Raises
-    ------
-    Refused
-        If the page cannot be written.
-    """
+    """Print a row for each scene; with a directory of pages, write the page. Returns 1 if one is not explained."""
     rows = [measure(scenes.load(name)) for name in tqdm(sorted(scenes.names()), desc="digits", file=sys.stderr)]
     for row in rows:
         print(*row.cells, sep="  ")

@@ -16,7 +16,7 @@ from grasp_ros.accuracy.measure import Contender
 from grasp_ros.physics.energy import energy
 from grasp_ros.scene import Scene
 from lab.reference.deadline import Deadline, deadline
-from lab.studies.contenders import all_contenders
+from lab.studies.accuracy import all_contenders
 from lab.studies.records import Journal, origin, scene_key
 
 SECONDS = 2000.0

@@ -7,6 +7,7 @@ segment by itself under continuous feedback, of the whole run with held commands
 
 from __future__ import annotations
 
+import ctypes
 import math
 import sys
 import tempfile
@@ -17,28 +18,35 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import cfunc, typeof
 from tqdm import tqdm
 
 from grasp_ros import scene as scenes
+from grasp_ros.exact.driver.callback import SIGNATURE, Observer, block_of, reader
 from grasp_ros.exact.integrator import Integrator
-from grasp_ros.exact.records import Integers, Loop, new_cursor
+from grasp_ros.exact.records import Integers, Loop, Tables, new_cursor
 from grasp_ros.physics.layout import Kind, Work
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import BY_SECTION, EFFECTS
-from grasp_ros.simulation import simulate
+from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.simulation import canvas, simulate
 from grasp_ros.simulation.closed_loop import drive
+from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, save
 from grasp_ros.simulation.sampled_plant import tick_times
 from lab.drills import recorder
-from lab.studies import page_figures, pages
-from lab.studies.segment_clock import SegmentClock
-from lab.studies.turns import in_turn
+from lab.studies import pages
+from lab.studies.speed import in_turn
 
 PAGE, SCENE, BARE = "costs", "case_01", "bare"
 REPEATS, SAMPLED_REPEATS = 31, 21
 MOST_SEGMENTS = 10**5
 RECORDED_S = 1.0
 LESSER = ("hammer", "no_contact")  # scenes that name less than the paper's grasp
+COUNT, FIRST = 2, 3  # indices, behind the seconds and nanoseconds of the clock; from the last on kind and time in turn
+MONOTONIC = time.CLOCK_MONOTONIC
+clock_gettime = ctypes.CDLL(None).clock_gettime
+clock_gettime.argtypes = ctypes.c_int, ctypes.c_size_t
 
 
 class Cost(NamedTuple):
@@ -52,13 +60,7 @@ class Cost(NamedTuple):
 
 
 def run(docs: Path | None) -> None:
-    """Print the page on costs, or write it with its figure into a directory of pages.
-
-    Raises
-    ------
-    Refused
-        If the page cannot be written.
-    """
+    """Print the page on costs, or write it with its figure into a directory of pages."""
     scene = scenes.load(SCENE)
     found = variants(scene)
     costs = measure(found)
@@ -66,8 +68,24 @@ def run(docs: Path | None) -> None:
     rows = [row(name, keys[name], counts(one), costs[name]) for name, one in found.items()]
     if docs is not None:
         shown = [(name, cost.tick * 1e6, cost.bag / 1e3) for name, cost in costs.items()]
-        page_figures.effect_costs(shown, docs / f"{PAGE}.png")
+        _draw(shown, docs / f"{PAGE}.png")
     pages.write(docs, PAGE, scene=scene, rows=rows)
+
+
+@canvas.style()
+def _draw(rows: Sequence[tuple[str, float, float]], path: Path) -> None:
+    """Draw what variants of a scene cost: name, us per control period, kB per simulated second."""
+    names = [name for name, _, _ in rows]
+    figure, panels = canvas.subplots(1, 2, sharey=True, figsize=(9.0, 0.3 * len(rows) + 1.2))
+    for axes, column, label in zip(panels, (1, 2), ("us per control period, no ROS", "bag, kB per s"), strict=True):
+        values = [float(row[column]) for row in rows]
+        bars = axes.barh(names, values, color=[OBJECT_COLOR if name == names[0] else LEFT_COLOR for name in names])
+        axes.bar_label(bars, [f"{value / values[0]:.2f}" for value in values], padding=3, fontsize="small")
+        axes.axvline(values[0], color=OBJECT_COLOR, linewidth=0.8, linestyle="--")
+        axes.set(xlim=(0.0, 1.15 * max(values)), xlabel=label)
+    panels[0].invert_yaxis()
+    figure.suptitle("cost of each effect; beside the bars: ratio to the bare scene", fontsize="medium")
+    save(figure, path)
 
 
 def variants(scene: Scene) -> dict[str, Scene]:
@@ -166,3 +184,41 @@ def _bag_size(scene: Scene) -> float:
         bag = Path(directory) / "bag"
         recorder.write(bag, simulate(short, sampled=True))
         return sum(file.stat().st_size for file in bag.iterdir()) / RECORDED_S
+
+
+class Clock(NamedTuple):
+    """What it is called with."""
+
+    numbers: Integers  # (FIRST + 2 n,)
+
+
+clock_at = reader(typeof(Clock(np.zeros(0, dtype=np.int64))))
+
+
+@cfunc(SIGNATURE)  # type: ignore[untyped-decorator]
+def read_clock(context: int, kind: int, t: float, s: float, unit: float, degree: int) -> int:
+    """Note the kind of a segment, and when it was over."""
+    numbers = clock_at(context).numbers
+    clock_gettime(MONOTONIC, numbers.ctypes.data)
+    row = FIRST + 2 * numbers[COUNT]
+    numbers[row], numbers[row + 1] = kind, numbers[0] * NANOSECONDS + numbers[1]
+    numbers[COUNT] += 1
+    return 0
+
+
+class SegmentClock(Observer):
+    """An observer that reads the clock after each segment of one run, of which it has at most `most`."""
+
+    def __init__(self, most: int) -> None:
+        self._places: Integers = np.zeros(FIRST + 2 * most, dtype=np.int64)
+        self._block = block_of(Clock(self._places))
+
+    def attach(self, tables: Tables) -> Integers:
+        """What a run calls after each segment."""
+        return np.array([read_clock.address, self._block.ctypes.data])
+
+    @property
+    def segments(self) -> tuple[Integers, Array]:
+        """Kind, and length in s of wall time, of every segment but the first, whose begin is not known."""
+        noted = self._places[FIRST : FIRST + 2 * self._places[COUNT]].reshape(-1, 2)
+        return noted[1:, 0], np.diff(noted[:, 1]) / NANOSECONDS

@@ -20,10 +20,9 @@ from grasp_ros.simulation import canvas
 from grasp_ros.simulation.plots import save
 from lab.studies.accuracy import frontier
 from lab.studies.drift import Drift
-from lab.studies.loop import Point
+from lab.studies.loop import FIRST_S, Limit, Point, simulated_growth
 from lab.studies.predictability import LEVELS, Prediction
 from lab.studies.records import by_scene
-from lab.studies.stability import FIRST_S, Limit, simulated_growth
 
 COLORS = {  # by the beginning of a method's name; distinguishable for colour-blind readers
     "exact": "#000000", "paper": "#d55e00", "rk45": "#56b4e9", "rk4": "#e69f00", "discrete": "#8c6d1f",

@@ -4,30 +4,35 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch
 from tqdm import tqdm
 
 from grasp_ros.exact.events import Event
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.simulation import simulate
+from grasp_ros.simulation import canvas, simulate
+from grasp_ros.simulation.plots import LEFT_COLOR, save
 from lab.cases import regression
 from lab.cases.case import Case, Product, Unfinished, Verdict, evaluate
 from lab.cases.families import ORDER
 from lab.cases.registry import cases
 from lab.cases.scenes import library
 from lab.reference.deadline import Deadline, deadline
-from lab.studies import page_figures, pages
+from lab.studies import pages
 from lab.studies.records import write_csv
 
 OTHERS = (("lsoda_events", 1e-12), ("paper", 1e-4))  # scipy's best on these scenes; the paper's method, step in s
 SECONDS = 1.5  # that another method may take for a case
 FAR = 1e-3  # an error that no one would call a result
+KEPT, BROKEN, NONE = "kept", "broken", "no result"
+OUTCOMES = {KEPT: (LEFT_COLOR, "", "white"), BROKEN: ("#f2a65a", "////", "black"), NONE: ("#d8d8d8", "", "black")}
 
 
 class Row(NamedTuple):
@@ -59,13 +64,7 @@ class Other:
 
 
 def run(docs: Path | None, alone: bool) -> int:
-    """Print a row for each case; with a directory of pages, write the page there. Returns 1 if a case is wrong.
-
-    Raises
-    ------
-    Refused
-        If the page cannot be written.
-    """
+    """Print a row for each case; with a directory of pages, write the page there. Returns 1 if a case is wrong."""
     rows: list[Row] = []
     others = [] if alone else [Other(name, setting) for name, setting in OTHERS]
     for case in tqdm(cases(), desc="hard", file=sys.stderr):
@@ -77,7 +76,7 @@ def run(docs: Path | None, alone: bool) -> int:
     print(f"{right} of {len(rows)} cases are right")
     if docs is not None:
         names = ["this package", *(other.name for other in others)]
-        page_figures.hard_cases(counts(rows, len(others)), names, docs / "hard.png")
+        _draw(counts(rows, len(others)), names, docs / "hard.png")
         heads = ["family", "case", "promised", "reached", *names[1:], "note"]
         write_csv(heads, ([row.case.family.name, *cells(row), *["-"] * (len(others) - len(row.others)), row.case.note]
                           for row in rows), docs / "hard.csv")
@@ -122,8 +121,8 @@ def _members(rows: Sequence[Row]) -> dict[str, list[Row]]:
 def _outcome(verdict: Verdict, case: Case) -> str:
     """Whether a method keeps the bound of a case."""
     if verdict.right(case):
-        return page_figures.KEPT
-    return page_figures.NONE if verdict.error is None else page_figures.BROKEN
+        return KEPT
+    return NONE if verdict.error is None else BROKEN
 
 
 def _compared(others: Sequence[Other], rows: Sequence[Row]) -> list[list[str]]:
@@ -143,9 +142,9 @@ def _results(rows: Sequence[Row], others: int) -> list[list[str]]:
     found = []
     for (name, (own, *theirs)), members in zip(counts(rows, others).items(), _members(rows).values(), strict=True):
         parts = [row.own.error / row.case.bound for row in members if row.own.error and row.case.bound]
-        kept = [f"{count[page_figures.KEPT]} of {count.total()}" if count else "-" for count in theirs]
+        kept = [f"{count[KEPT]} of {count.total()}" if count else "-" for count in theirs]
         assert own is not None
-        found.append([name, f"{own[page_figures.KEPT]} of {own.total()}", f"{max(parts, default=0.0):.1g}", *kept])
+        found.append([name, f"{own[KEPT]} of {own.total()}", f"{max(parts, default=0.0):.1g}", *kept])
     return found
 
 
@@ -157,3 +156,40 @@ def cells(row: Row) -> list[str]:
 
 def _short(verdict: Verdict) -> str:
     return verdict.status if verdict.error is None else f"{verdict.error:.1e}"
+
+
+@canvas.style()
+def _draw(rows: Mapping[str, Sequence[Counter[str] | None]], solvers: Sequence[str], path: Path) -> None:
+    """Draw how many cases of each family each solver keeps, breaks, or has no result of; None: it was not asked."""
+    size = (2.2 + 2.6 * len(solvers), 0.33 * len(rows) + 1.2)
+    figure, panels = canvas.subplots(1, len(solvers), sharey=True, squeeze=False, figsize=size)
+    for column, (axes, solver) in enumerate(zip(panels[0], solvers, strict=True)):
+        for row, counts in enumerate(each[column] for each in rows.values()):
+            _bar(axes, row, counts)
+        axes.set_xlim(0.0, 1.0)
+        axes.set_xticks([])
+        axes.set_title(solver, fontsize="medium")
+        axes.spines[:].set_visible(False)
+        axes.tick_params(left=False)
+    panels[0, 0].set_yticks(range(len(rows)), list(rows))
+    panels[0, 0].set_ylim(len(rows) - 0.5, -0.5)
+    handles = [Patch(facecolor=color, hatch=hatch, edgecolor="white", label=name)
+               for name, (color, hatch, _) in OUTCOMES.items()]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False,
+                  title="cases of each family: error against the promised bound", title_fontsize="small")
+    save(figure, path)
+
+
+def _bar(axes: Axes, row: int, counts: Counter[str] | None) -> None:
+    """A bar with a part for each outcome, and its number."""
+    if counts is None:
+        axes.text(0.0, row, "not asked", va="center", fontsize="small", color="#555555")
+        return
+    left, whole = 0.0, counts.total()
+    for name, (color, hatch, ink) in OUTCOMES.items():
+        if counts[name]:
+            width = counts[name] / whole
+            axes.barh(row, width, left=left, height=0.8, color=color, hatch=hatch, edgecolor="white", linewidth=0.8)
+            axes.text(left + 0.5 * width, row, str(counts[name]), ha="center", va="center", fontsize="small", color=ink,
+                      bbox={"facecolor": color, "edgecolor": "none", "pad": 1.0})
+            left += width

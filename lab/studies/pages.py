@@ -18,13 +18,7 @@ PRODUCT = "grasp_ros", "config"  # what is measured
 
 
 def write(docs: Path | None, name: str, **numbers: object) -> None:
-    """Write docs/NAME.md from its template with these numbers and a stamp; without a directory print it.
-
-    Raises
-    ------
-    Refused
-        If it cannot be written.
-    """
+    """Write docs/NAME.md from its template with these numbers and a stamp; without a directory print it."""
     text = render(name, stamp=stamp(), **numbers)
     if docs is None:
         print(text, end="")
@@ -33,13 +27,7 @@ def write(docs: Path | None, name: str, **numbers: object) -> None:
 
 
 def put(path: Path, text: str) -> None:
-    """Write a text into a file, and make the directory that it needs; say so.
-
-    Raises
-    ------
-    Refused
-        If it cannot be written.
-    """
+    """Write a text into a file, and make the directory that it needs; say so. Refused: it cannot be written."""
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
@@ -63,13 +51,7 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def claim(path: Path) -> None:
-    """Make sure, before the work, that a file can be written to where it is to go.
-
-    Raises
-    ------
-    Refused
-        If it cannot.
-    """
+    """Refuse, before the work, a file that could not be written to where it is to go."""
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         there = path.exists()
@@ -79,18 +61,14 @@ def claim(path: Path) -> None:
 
 
 def stamp() -> str:
-    """The sentence that every measured page carries: date, commit and machine."""
+    """The sentence that every measured page carries: date, commit and whether what is measured differs, machine."""
     machine = describe_machine()
     system, cpu = machine.pop("system"), machine.pop("cpu")
     versions = ", ".join(f"{name} {version}" for name, version in machine.items())
-    return f"Measured on {time.strftime('%Y-%m-%d')} from commit {_commit()}: {system}, {cpu}, {versions}."
-
-
-def _commit() -> str:
-    """The commit of this checkout, and whether what is measured differs from it."""
     commit = _git("rev-parse", "--short", "HEAD")
-    changed = commit and _git("status", "--porcelain", "--", *PRODUCT)
-    return f"{commit or 'unknown'}{' with changes' if changed else ''}"
+    changes = " with changes" if commit and _git("status", "--porcelain", "--", *PRODUCT) else ""
+    return (f"Measured on {time.strftime('%Y-%m-%d')} from commit {commit or 'unknown'}{changes}: {system}, {cpu},"
+            f" {versions}.")
 
 
 def _git(*words: str) -> str:

@@ -55,13 +55,7 @@ def exact() -> tuple[float, Array]:
 
 
 def run() -> list[Row]:
-    """Of each peer the setting with the smallest errors of derivatives.
-
-    Raises
-    ------
-    Refused
-        If a peer is not installed.
-    """
+    """Of each peer, which must be installed, the setting with the smallest errors of derivatives."""
     need("this", *PACKAGES)
     peers: tuple[Callable[[], Iterator[Row]], ...] = (_ours, *_DIFFRAX, _torchdiffeq, _mjx)
     return [min(peer(), key=lambda row: max(row.by)) for peer in peers]

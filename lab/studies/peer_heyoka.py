@@ -21,7 +21,7 @@ from grasp_ros.physics.layout import LEFT, RIGHT, X
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from lab.reference.grasp import Grasp, grasp_of
-from lab.studies.peers import other_side_touches
+from lab.studies.peer_sundials import other_side_touches
 
 BALLISTIC_S = 1e-7  # both sides' forces are left out so long after a touch of both: 1e-14 N s of impulse in case 1
 BALLISTIC_HERTZ = 1e4  # where that holds, N/m^1.5; the impulse at 1 m/s is H t^2.5

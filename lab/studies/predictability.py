@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -34,12 +33,8 @@ class Prediction(NamedTuple):
         return float(self.t[passed[0]]) if len(passed) else None
 
 
-def run(subjects: Sequence[Scene], seconds: float = SECONDS) -> list[Prediction]:
+def predict(scene: Scene, seconds: float = SECONDS) -> Prediction:
     """Measure with `exact`; the perturbations are the same in every run."""
-    return [_predict(scene, seconds) for scene in subjects]
-
-
-def _predict(scene: Scene, seconds: float) -> Prediction:
     grid = np.linspace(0.0, seconds, POINTS)
     signs = np.random.default_rng(1990).choice([-1.0, 1.0], size=(RUNS, 6))
     start = scene.initial_state

@@ -58,21 +58,12 @@ def origin(family: str) -> str:
 class Journal:
     """Records on disk, one JSON line each, written as they are measured.
 
-    Parameters
-    ----------
-    directory : Path
-        Made if it does not exist.
-
-    Raises
-    ------
-    Refused
-        If the directory cannot be made or written, or holds a journal that is damaged.
+    The directory is made if it does not exist. Refused: it cannot be made or written, or its journal is damaged.
     """
 
     def __init__(self, directory: Path) -> None:
         with writing(directory):
             directory.mkdir(parents=True, exist_ok=True)
-        self.directory = directory
         self._path = directory / "journal.jsonl"
         self._lines: dict[str, Any] = {}
         if self._path.exists():
@@ -92,13 +83,7 @@ class Journal:
                 self._lines[entry["key"]] = entry["value"]
 
     def get(self, key: str, kind: type[T]) -> T | None:
-        """What was noted under a key; None if nothing was.
-
-        Raises
-        ------
-        Refused
-            If it is no record of this kind.
-        """
+        """What was noted under a key; None if nothing was. Refused: it is no record of this kind."""
         if key not in self._lines:
             return None
         hints = get_type_hints(kind)
@@ -161,13 +146,9 @@ def write_csv(heads: Sequence[str], rows: Iterable[Sequence[object]], path: Path
 
 def write_records(records: Iterable[Record], path: Path) -> None:
     """All records as a table with a header."""
-    write_csv([*Record._fields, "missed"], [
-        [*record._replace(found=_pair(record.found), there_are=_pair(record.there_are)), record.missed]  # type: ignore[arg-type]
-        for record in records], path)
-
-
-def _pair(pair: tuple[int, int] | None) -> str | None:
-    return None if pair is None else f"{pair[0]}/{pair[1]}"
+    rows = (["/".join(map(str, cell)) if isinstance(cell, tuple) else cell for cell in record] + [record.missed]
+            for record in records)
+    write_csv([*Record._fields, "missed"], rows, path)
 
 
 def by_scene(records: Iterable[Record]) -> dict[str, list[Record]]:

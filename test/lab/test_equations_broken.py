@@ -17,7 +17,7 @@ from grasp_ros.physics.layout import LEFT
 from grasp_ros.physics.lyapunov import reach
 from grasp_ros.physics.model import impact_force, in_contact, penetration
 from grasp_ros.physics.system import System
-from lab.paper import by_hand, conditions, equations, sample
+from lab.paper import by_hand, equations, sample
 from lab.paper.cases import load_cases
 from lab.paper.equations import CROSSING, rows_of
 from lab.paper.sample import Sample
@@ -92,12 +92,12 @@ BROKEN: list[tuple[set[str], Any, str, Any]] = [
     ({"(18)", "(23)"}, by_hand, "rate", scaled(by_hand.rate)),
     ({"(28)", "(29)"}, by_hand, "parts", scaled(by_hand.parts)),
     ({"(11)", "(16)", "(21)", "(28)"}, sample, "energy", level(lambda found, _, __: found._replace(V=OFF * found.V))),
-    ({"(17)", "(22)", "(26)"}, conditions, "energy", level(lambda found, _, __: found._replace(V=-found.V))),
+    ({"(17)", "(22)", "(26)"}, equations, "energy", level(lambda found, _, __: found._replace(V=-found.V))),
     ({"(18)", "(23)"}, sample, "energy", level(lambda found, _, __: found._replace(V_rate=OFF * found.V_rate))),
     ({"(19)", "(24)"}, sample, "energy", level(with_stored)),
     ({"(20)", "(25)", "(27)"}, sample, "energy", level(lambda found, _, __: found._replace(V_rate=-found.V_rate))),
     ({"(12)", "(29)", "(30)", "(31)", "(32)", "(33)", "(34)"}, lyapunov, "parts", stretched(lyapunov.parts)),
-    ({"(35)", "(36)", "(37)"}, conditions, "reach", scaled(reach, 1e-3)),
+    ({"(35)", "(36)", "(37)"}, equations, "reach", scaled(reach, 1e-3)),
 ]
 BY_CONSTRUCTION = {"(13)"}  # the order of the state is that of the arrays that everything here reads
 

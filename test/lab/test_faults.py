@@ -19,10 +19,9 @@ from std_msgs.msg import String
 from grasp_ros.graph.ros import messages
 from grasp_ros.scene.topics import JOINT_STATES, SCENE
 from lab.drills.faults import run
-from lab.drills.faults.drill import node
+from lab.drills.faults.drill import Evidence, Verdict, node
 from lab.drills.faults.output import Output, plain
 from lab.drills.faults.stage import NODES
-from lab.drills.faults.verdict import Evidence, Verdict
 from lab.drills.nodes.fault_injector import FaultInjector
 
 GOOD = Evidence(said="it is gone", noticed=0.5, exits={"grasp run": 1})

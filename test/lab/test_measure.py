@@ -14,11 +14,11 @@ from documents import horizon, stalling
 
 from grasp_ros import scene as scenes
 from grasp_ros.accuracy.measure import Answer, Contender, Record, Truth, contender_of, finest
-from lab.studies import accuracy, figures, measure
+from lab.studies import accuracy, figures
 from lab.studies.records import Journal, write_records
 
 SHORT = "time.duration_s=2"
-QUICK = measure.QUICK._replace(stride=1)
+QUICK = accuracy.QUICK._replace(stride=1)
 
 
 def contender(name: str, *ladder: float) -> Contender:
@@ -27,9 +27,9 @@ def contender(name: str, *ladder: float) -> Contender:
 
 def test_error_contacts_and_work_are_measured_not_believed(tmp_path: Path) -> None:
     scene = scenes.load("case_01", [SHORT])
-    target = measure.truth(scene, Journal(tmp_path))
-    exact = measure.attempt(contender("exact", 1e-16), scene, 1e-16, target, QUICK)
-    coarse = measure.attempt(contender("paper", 1e-3), scene, 1e-3, target, QUICK)
+    target = accuracy.truth(scene, Journal(tmp_path))
+    exact = accuracy.attempt(contender("exact", 1e-16), scene, 1e-16, target, QUICK)
+    coarse = accuracy.attempt(contender("paper", 1e-3), scene, 1e-3, target, QUICK)
     assert exact.error is not None
     assert coarse.error is not None
     assert exact.error < 1e-13 < 1e-6 < coarse.error
@@ -38,7 +38,7 @@ def test_error_contacts_and_work_are_measured_not_believed(tmp_path: Path) -> No
     assert coarse.seconds is not None
     assert coarse.first > coarse.time > 0.0
     assert coarse.repeats >= 1
-    again = measure.truth(scene, Journal(tmp_path))
+    again = accuracy.truth(scene, Journal(tmp_path))
     assert (again.state == target.state).all()
 
 
@@ -46,9 +46,9 @@ def test_error_contacts_and_work_are_measured_not_believed(tmp_path: Path) -> No
 def test_a_method_that_misses_contacts_is_shown_with_its_count(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(measure, "truth", lambda scene, journal: finest(scene))  # in place of 20 s with 25 digits
+    monkeypatch.setattr(accuracy, "truth", lambda scene, journal: finest(scene))  # in place of 20 s with 25 digits
     case = horizon("v_jump_one_sided", 5.0)
-    effort = QUICK._replace(patience=math.inf)  # on a machine that is slow, too
+    effort = QUICK._replace(each=QUICK.each._replace(patience=math.inf))  # on a machine that is slow, too
     records = accuracy.run([case], tmp_path, effort, [contender("lsoda_events", 1e-4, stalling())])
     wrong, stalled = records
     assert wrong.status == "done"
@@ -75,12 +75,12 @@ def test_a_solver_that_is_missing_or_too_slow_is_a_record(tmp_path: Path) -> Non
         while True:
             pass
 
-    missing = measure.attempt(Contender("x", "x", "tolerance", (1.0,), absent), scene, 1.0, target, QUICK)
+    missing = accuracy.attempt(Contender("x", "x", "tolerance", (1.0,), absent), scene, 1.0, target, QUICK)
     assert (missing.status, missing.error) == ("not installed", None)
     effort = QUICK._replace(deadline=0.05)
-    slow = measure.attempt(Contender("x", "x", "tolerance", (1.0,), endless), scene, 1.0, target, effort)
+    slow = accuracy.attempt(Contender("x", "x", "tolerance", (1.0,), endless), scene, 1.0, target, effort)
     assert slow.status == "stopped: longer than 0.05 s"
-    assert measure.given_up(slow, effort)
+    assert accuracy.given_up(slow, effort)
 
 
 def test_a_study_resumes_and_survives_a_line_cut_short(tmp_path: Path) -> None:
@@ -112,6 +112,6 @@ def test_a_study_resumes_and_survives_a_line_cut_short(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_ladder_ends_where_a_run_takes_too_long(tmp_path: Path) -> None:
     scene = scenes.load("case_01", [SHORT])
-    effort = QUICK._replace(patience=0.0)
+    effort = QUICK._replace(each=QUICK.each._replace(patience=0.0))
     records = accuracy.run([scene], tmp_path, effort, [contender("rk4", 1e-2, 1e-3, 1e-4)])
     assert [r.setting for r in records] == [1e-2]

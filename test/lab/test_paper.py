@@ -17,15 +17,11 @@ from lab.paper import arms, beyond
 from lab.paper.cases import FIGURES, SYMMETRIC, load_cases, random_starts, started, with_values
 from lab.paper.claims import Check, Claim, Kind, Part, Verdict
 from lab.paper.equations import equations
-from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import measure, seconds, settlings
 from lab.paper.prints import compared
-from lab.paper.quantities import quantities
-from lab.paper.replay import COLUMNS, frames, replays
-from lab.paper.scatter import median
+from lab.paper.results import COLUMNS, frames, quantities, replays, uncertainties
+from lab.paper.scatter import asymmetry, median, where_false
 from lab.paper.statements import STATEMENTS
-from lab.paper.symmetry import asymmetry, where_false
-from lab.paper.uncertainties import uncertainties
 
 CASES = load_cases()
 STARTS = random_starts(4)
@@ -94,7 +90,7 @@ def test_the_object_mass_does_not_matter_from_a_symmetric_start() -> None:
 
 def test_a_symmetric_start_is_a_knife_edge() -> None:
     """A nanometre becomes a millimetre within seconds, but not where the arms are damped strongly."""
-    rows = {row.case: row for row in knife_edge(CASES)}
+    rows = {row.case: row for row in beyond.knife_edge(CASES)}
     assert all(row.rest == 0.0 for row in rows.values())
     assert rows[2].visible < 8.0
     assert 1.5 < rows[2].rate < 3.0

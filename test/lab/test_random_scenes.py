@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from grasp_ros.physics.errors import Refused
-from lab.drills import fuzz, random_scenes
+from lab.drills import fuzz
 from lab.oracles.properties import Check, Examination
 
 CHECKS = [Check("energy", 3.0, 100.0, skipped=2), Check("mirror", 1.0, 0.0)]
@@ -28,8 +28,8 @@ def examined(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 def search(directory: Path, draws: int, seed: int = 5) -> str:
     """The page after a search."""
-    book = fuzz.run(seed, directory, draws=draws, first=10, memory=random_scenes.Kept(directory, seed))
-    random_scenes.write_page(directory, seed, 10, book)
+    book = fuzz.run(seed, directory, draws=draws, first=10, memory=fuzz.Kept(directory, seed))
+    fuzz.write_page(directory, seed, 10, book)
     return (directory / "fuzz.md").read_text(encoding="utf-8")
 
 

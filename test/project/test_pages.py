@@ -24,7 +24,7 @@ PAGES = [page for page in (README, *sorted((ROOT / "docs").rglob("*.md"))) if ex
 
 def marks(page: Path) -> list[pytest.MarkDecorator]:
     """How long the commands of a page take."""
-    slow = [pytest.mark.slow] if examples.has_commands(page.read_text()) else []
+    slow = [pytest.mark.slow] if examples.has_examples(page.read_text(), ("console", "sh")) else []
     return [*slow, pytest.mark.thorough] if page.relative_to(ROOT).as_posix() in LONG else slow
 
 

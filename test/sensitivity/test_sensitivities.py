@@ -19,7 +19,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.spectrum import spectrum
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.differentiate import Sensitivity, differentiate
-from lab.reference.derivative import difference
+from lab.reference.solve import difference
 
 P = "left_contact.dissipation_s_per_m"
 

@@ -1,14 +1,16 @@
-"""One drill: a graph at work, an accident, and the wait for what comes of it."""
+"""One drill: a graph at work, an accident, the wait for what comes of it, and the verdict on that."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import os
+import re
 import signal
 import subprocess
 import time
 from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from enum import Enum
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,10 +19,8 @@ import numpy as np
 from grasp_ros.graph import bag
 from grasp_ros.graph.bag.verify import verify
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV_NAMES, WINDOW, Topic
-from lab.drills.faults.companion import Failed
 from lab.drills.faults.output import NO_NEWS, SENTENCE, plain
-from lab.drills.faults.stage import NODES, Stage
-from lab.drills.faults.verdict import LOST_SECONDS, Evidence
+from lab.drills.faults.stage import NODES, Failed, Stage
 
 TERMINALS = (*NODES, "run")  # last words of the names of what a user has in a terminal
 DEADLINE_SECONDS = 30.0
@@ -29,6 +29,66 @@ GO_ON_TICKS, GO_ON_SECONDS = WINDOW + 100, 4.0  # after the accident, when who w
 LOOK_SECONDS = 0.1
 SUSPENDED = "this node was suspended"
 CLOSE_SECONDS = 15.0  # for the end after a Ctrl-C, or behind `grasp run`
+NOTICE_SECONDS = 2.0  # the promise
+SLACK_SECONDS = 1.0  # for a machine on which two drills run at a time
+LOST_SECONDS = 0.2  # of recording
+
+
+class Verdict(Enum):
+    """How a drill ended; the first that holds."""
+
+    SKIPPED = "skipped"
+    TRACEBACK = "traceback"
+    LEFT = "left processes"
+    HUNG = "hung"
+    LOST = "lost data"
+    WRONG = "wrong result"
+    SILENT = "no message"
+    NAME = "names another process"
+    LATE = "noticed late"
+    SURVIVED = "survived"
+    SENTENCE = "ended with a message"
+
+    @property
+    def passes(self) -> bool:
+        """Whether this is as it should be."""
+        return self in (Verdict.SURVIVED, Verdict.SENTENCE, Verdict.SKIPPED)
+
+
+@dataclass
+class Evidence:
+    """What is known of a drill once it is over."""
+
+    said: str = ""  # what a user sees: the last sentence of a run that ended, the first of one that goes on; or none
+    culprit: str = ""  # pattern of what that has to name, see `Drill`
+    noticed: float = math.nan  # s, from the accident to the first sentence or report; NaN: never
+    exits: dict[str, int] = field(default_factory=dict)  # exit statuses by process
+    lost: float = 0.0  # s of wall time before the accident from which nothing is in the bag
+    went_on: bool = False
+    hung: bool = False
+    left: int = 0  # processes that are still there
+    shared: int = 0  # files in /dev/shm that are still there
+    traceback: str = ""  # its last line
+    wrong: str = ""  # why what the bag holds is not the run
+    mute: bool = False  # nobody could read a sentence: the terminal is gone
+    asked: bool = False  # a user has ended the run: that takes as long as it takes to close it
+    nothing_to_keep: bool = False  # the bag itself was taken away, or there was none
+    skipped: str = ""  # why the drill cannot be played here
+
+    @property
+    def verdict(self) -> Verdict:
+        """The first that holds."""
+        nothing_to_say = self.mute or (self.went_on and re.match(self.culprit, "") is not None)
+        silent = not self.said and not nothing_to_say
+        found = {
+            Verdict.SKIPPED: bool(self.skipped), Verdict.TRACEBACK: bool(self.traceback),
+            Verdict.LEFT: self.left > 0, Verdict.HUNG: self.hung,
+            Verdict.LOST: not self.nothing_to_keep and self.lost > LOST_SECONDS,
+            Verdict.WRONG: bool(self.wrong), Verdict.SILENT: silent,
+            Verdict.NAME: not self.mute and not re.search(self.culprit, self.said), Verdict.SURVIVED: self.went_on,
+            Verdict.LATE: not (self.mute or self.asked) and not self.noticed <= NOTICE_SECONDS + SLACK_SECONDS,
+        }
+        return next((verdict for verdict, holds in found.items() if holds), Verdict.SENTENCE)
 
 
 class Drill(NamedTuple):
@@ -62,7 +122,7 @@ class Skipped(Exception):  # noqa: N818 - no error
 def play(drill: Drill, stage: Stage) -> Evidence:
     """Play a drill to its end; returns what is known then."""
     if drill.play is not None:
-        return dataclasses.replace(drill.play(stage), culprit=drill.culprit)
+        return replace(drill.play(stage), culprit=drill.culprit)
     drill.start(stage)
     if drill.settle:
         stage.settle()
@@ -143,7 +203,7 @@ def _read_words(evidence: Evidence, stage: Stage, begin: float, end: float) -> N
     """
     news = stage.output.news(begin, end)
     concerns = stage.companion.ask("concerns")["concerns"]
-    reports = [(when, f"/diagnostics of {name.lstrip('/')}: {words}") for name, (when, _, words) in concerns.items()
+    reports = [(when, f"/diagnostics of {name.lstrip('/')}: {words}") for name, (when, words) in concerns.items()
                if begin <= when <= end]
     times = [line.when for line in news] + [when for when, _ in reports]
     evidence.noticed = min(times, default=math.nan) - begin
@@ -192,14 +252,3 @@ def _first_gap(recording: bag.Recording) -> int:
     there = np.zeros(int(recording.tick[-1]) + 2, dtype=bool)
     there[recording.tick[whole]] = True
     return int(np.argmin(there))
-
-
-def lost_words(evidence: Evidence) -> str:
-    """What is kept, for a reader."""
-    if evidence.nothing_to_keep:
-        return "nothing is there to keep"
-    if math.isinf(evidence.lost):
-        return evidence.wrong
-    if evidence.lost > LOST_SECONDS:
-        return f"all but {evidence.lost:.1f} s"
-    return "all" if not evidence.lost else f"all but at most {LOST_SECONDS} s"

@@ -13,8 +13,7 @@ from tqdm import tqdm
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
 from grasp_ros.scene.effects.base import NANOSECONDS
-from lab.drills.faults.companion import Companion, free_domains
-from lab.drills.faults.stage import NODES, Stage
+from lab.drills.faults.stage import NODES, Companion, Stage, free_domains
 
 LOOK_SECONDS = 0.5
 MOST_GROWTH = 10.0  # bytes a tick, of a process, from the first quarter of the run to its end

@@ -13,10 +13,8 @@ from functools import partial
 
 from grasp_ros.graph.host import LOCALHOST, RANGE, SUBNET
 from grasp_ros.scene.topics import JOINT_STATES
-from lab.drills.faults.companion import Failed
-from lab.drills.faults.drill import Drill, Skipped
-from lab.drills.faults.stage import START_SECONDS, Stage
-from lab.drills.faults.verdict import Evidence
+from lab.drills.faults.drill import Drill, Evidence, Skipped
+from lab.drills.faults.stage import START_SECONDS, Failed, Stage
 
 GROUP = "three hosts"
 HOSTS = {"one": ("plant",), "two": ("left_controller", "right_controller"), "three": ("monitor",)}

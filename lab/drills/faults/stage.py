@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -21,7 +23,7 @@ import psutil
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import JOINT_STATES, Topic
-from lab.drills.faults.companion import Companion, Failed
+from lab.drills import nodes
 from lab.drills.faults.output import Output
 
 START_SECONDS = 60.0  # for a graph to start on a machine that is busy
@@ -33,20 +35,71 @@ GRASP = [sys.executable, "-P", "-m", "grasp_ros.cli"]
 NODE = [sys.executable, "-P", "-m", "grasp_ros.graph"]
 NODES = ("plant", "left_controller", "right_controller", "monitor")
 MARK = "GRASP_DRILL"  # variable by which the processes of a drill are known, whoever is their parent
+DOMAINS = range(130, 230)  # beside those that people choose
+
+
+class Failed(Exception):  # noqa: N818 - a drill that could not take place
+    """The graph of a drill did not even start."""
+
+
+class Companion:
+    """The process of the fault injector, for one drill after the other.
+
+    A prefix of words before its command line takes it to another host.
+    """
+
+    def __init__(self, prefix: Sequence[str] = ()) -> None:
+        self._process = subprocess.Popen(
+            [*prefix, *nodes.command("fault_injector")],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+            env={**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, start_new_session=True,
+        )
+        self.pid = self._process.pid
+
+    def ask(self, action: str, **words: Any) -> dict[str, Any]:
+        """Let it do something; returns its answer. Failed: nobody reads what it would send, or it has ended."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write(json.dumps({"do": action, **words}) + "\n")
+        self._process.stdin.flush()
+        for line in self._process.stdout:
+            if line.startswith("{"):  # Fast DDS writes there, too
+                answer: dict[str, Any] = json.loads(line)
+                if "failed" in answer:
+                    raise Failed(answer["failed"])
+                return answer
+        raise Failed("the onlooker has ended")
+
+    def close(self) -> None:
+        """End it."""
+        self._process.kill()
+        self._process.communicate()
+
+
+def free_domains() -> list[int]:
+    """Domains in which nobody is at the moment: the ports of their first participants can be taken.
+
+    Another study at the same time begins with others.
+    """
+    found = [domain for domain in DOMAINS if _free(7410 + 250 * domain)]
+    first = os.getpid() % max(len(found), 1)
+    return found[first:] + found[:first]
+
+
+def _free(port: int) -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as endpoint:
+        try:
+            endpoint.bind(("", port))
+        except OSError:
+            return False
+    return True
 
 
 class Stage:
     """A directory, a domain, and the processes of one drill.
 
-    Parameters
-    ----------
-    folder : Path
-        New directory.
-    scene : Scene
-    companion : Companion
-    domain : int
-    seen : Topic, optional
-        By which ticks are counted: what the plant publishes, or what the monitor does once it has recorded a tick.
+    The directory is made. Ticks are counted by a topic: what the plant publishes, or what the monitor does once it has
+    recorded a tick.
     """
 
     def __init__(
@@ -140,10 +193,9 @@ class Stage:
 
     def has(self, name: str) -> bool:
         """Whether a node runs."""
-        try:
+        with suppress(Failed):
             return self.pid(name) > 0
-        except Failed:
-            return False
+        return False
 
     def said(self, words: str) -> bool:
         """Whether somebody has printed these words."""
@@ -197,13 +249,7 @@ class Stage:
         return True
 
     def settle(self) -> None:
-        """Wait until the graph is at work.
-
-        Raises
-        ------
-        Failed
-            If it does not get there.
-        """
+        """Wait until the graph is at work; raises Failed if it does not get there."""
         self.wait(lambda: self.published >= BEFORE or all(map(self.ended, self.started)), START_SECONDS)
         if self.published < BEFORE:
             raise Failed("; ".join(line.text for line in self.output.lines[-3:]) or "the graph does not start")

@@ -9,17 +9,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from grasp_ros.scene.topics import (
-    ALIVE,
-    CHANGES,
-    JOINT_STATES,
-    LEFT_COMMAND,
-    LEFT_CONTACT,
-    LYAPUNOV,
-    RUN,
-    SCENE,
-    Topic,
-)
+from grasp_ros.scene.topics import ALIVE, CHANGES, JOINT_STATES, LEFT_COMMAND, LEFT_CONTACT, LYAPUNOV, RUN, SCENE, Topic
 from lab.drills.faults.drill import Drill
 from lab.drills.faults.stage import NODE, Stage
 from lab.drills.nodes import NAME
@@ -86,7 +76,8 @@ def _scene_before(stage: Stage) -> None:
 def _rogues() -> list[Drill]:
     """The only controller of an arm, which answers well until then."""
     def rogue(name: str, fault: str, culprit: str = INJECTOR, **fields: Any) -> Drill:
-        return Drill(f"rogue-{name}", ROGUE, fault, _with_rogue, partial(_go_wrong, **fields), culprit=culprit)
+        return Drill(f"rogue-{name}", ROGUE, fault, _with_rogue,
+                     lambda stage: stage.companion.ask("control", side="left", **fields), culprit=culprit)
 
     return [
         rogue("large", "answers with 1e6 N", "", force=1e6),  # which a scene without a limit allows
@@ -102,10 +93,6 @@ def _rogues() -> list[Drill]:
 def _with_rogue(stage: Stage) -> None:
     stage.run("--without", "left_controller")
     stage.companion.ask("control", side="left")
-
-
-def _go_wrong(stage: Stage, **fields: Any) -> None:
-    stage.companion.ask("control", side="left", **fields)
 
 
 def _others() -> list[Drill]:

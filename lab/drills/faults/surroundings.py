@@ -18,9 +18,8 @@ from grasp_ros.graph import bag
 from grasp_ros.scene.topics import LEFT_COMMAND
 from grasp_ros.simulation import simulate
 from lab.drills import recorder
-from lab.drills.faults.drill import Drill, Skipped, play
+from lab.drills.faults.drill import Drill, Evidence, Skipped, play
 from lab.drills.faults.stage import NODES, Stage
-from lab.drills.faults.verdict import Evidence
 
 CHECKOUT = Path(__file__).parents[3]  # where `python -m lab` runs
 GROUP, NAMES, FILES = "terminal, disk and directory", "names and waiting", "files"
@@ -40,10 +39,10 @@ def drills() -> list[Drill]:
               culprit="no space is left on the disk"),
         Drill("file-limit", GROUP, "a limit of the file size (`ulimit -f`)", _with_limit, _until_the_end,
               by_itself=True, culprit="files may not be larger"),
-        Drill("deleted-bag", GROUP, "the directory of the bag is deleted", Stage.run, _delete_bag,
-              nothing_to_keep=True, culprit=DELETED),
-        Drill("deleted-run", GROUP, "the whole directory of the run is deleted", Stage.run, _delete_run,
-              nothing_to_keep=True, culprit=DELETED),
+        Drill("deleted-bag", GROUP, "the directory of the bag is deleted", Stage.run,
+              lambda stage: shutil.rmtree(stage.bag), nothing_to_keep=True, culprit=DELETED),
+        Drill("deleted-run", GROUP, "the whole directory of the run is deleted", Stage.run,
+              lambda stage: shutil.rmtree(stage.bag.parent), nothing_to_keep=True, culprit=DELETED),
         # From here on what counts is measured, not said, or nothing happens.
         _own("shared-memory", GROUP, "files in /dev/shm after a SIGKILL of all four nodes", _shared_memory),
         _own("idle", NAMES, "a plant that waits, alone: at most 5 % of a core", _idle),
@@ -101,14 +100,6 @@ def _with_limit(stage: Stage) -> None:
 
 def _until_the_end(stage: Stage) -> None:
     stage.wait(lambda: stage.ended("grasp run"), 60.0)
-
-
-def _delete_bag(stage: Stage) -> None:
-    shutil.rmtree(stage.bag)
-
-
-def _delete_run(stage: Stage) -> None:
-    shutil.rmtree(stage.bag.parent)
 
 
 def _shared_memory(stage: Stage) -> Evidence:

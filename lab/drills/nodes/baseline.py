@@ -18,23 +18,12 @@ from rclpy.node import Node
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.serialization import raw_stamp_ns
 from grasp_ros.physics.system import BODIES
-from grasp_ros.scene.topics import (
-    CLOCK,
-    JOINT_STATES,
-    LEFT_COMMAND,
-    LEFT_CONTACT,
-    LYAPUNOV,
-    LYAPUNOV_NAMES,
-    RIGHT_COMMAND,
-    RIGHT_CONTACT,
-    Topic,
-)
+from grasp_ros.scene.topics import CLOCK, COMMANDS, CONTACTS, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, Topic
 from lab.drills.nodes import plain_messages
 
 SETTLE_SECONDS = 4.0  # longer than discovery was ever seen to take
 PERIOD_NS = 1_000_000
-INPUTS = (JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, LEFT_CONTACT, RIGHT_CONTACT)
-COMMANDS = {"left_controller": LEFT_COMMAND, "right_controller": RIGHT_COMMAND}
+INPUTS = (JOINT_STATES, *COMMANDS.values(), *CONTACTS.values())
 
 
 class Baseline(Node):
@@ -47,7 +36,7 @@ class Baseline(Node):
         self._heard: set[str] = set()
         self.finished = False
         if name == "plant":
-            self._outputs = [self._publisher(topic) for topic in (CLOCK, LEFT_CONTACT, RIGHT_CONTACT, JOINT_STATES)]
+            self._outputs = [self._publisher(topic) for topic in (CLOCK, *CONTACTS.values(), JOINT_STATES)]
             for topic in COMMANDS.values():
                 self._subscribe(topic, partial(self._on_command, topic.name))
             self._subscribe(LYAPUNOV, lambda _: None, raw=True)
@@ -56,7 +45,7 @@ class Baseline(Node):
             for topic in INPUTS:
                 self._subscribe(topic, self._on_anything, raw=True)
         else:
-            self._outputs = [self._publisher(COMMANDS[name])]
+            self._outputs = [self._publisher(COMMANDS[name.removesuffix("_controller")])]
             self._subscribe(JOINT_STATES, self._on_state)
 
     def _publisher(self, topic: Topic) -> Any:

@@ -38,14 +38,8 @@ WALL = "wall"  # in place of a stamp in ns: the wall clock, as a header that fil
 class FaultInjector:
     """What happens in one domain.
 
-    Parameters
-    ----------
-    domain : int
-    times : path
-        Array of the file format of NumPy; entry k becomes the time, on the monotonic clock, at which tick k was seen.
-    period_ns : int
-    topic : str
-        Where it is looked for.
+    In the file of an array of NumPy entry k becomes the time, on the monotonic clock, at which tick k was seen on the
+    topic.
     """
 
     def __init__(self, domain: int, times: str, period_ns: int, topic: str) -> None:
@@ -56,7 +50,7 @@ class FaultInjector:
         self._executor.add_node(self._node)
         self._times = np.load(Path(times), mmap_mode="r+")
         self._period_ns, self._latest_ns = period_ns, 0
-        self._concerns: dict[str, tuple[float, int, str]] = {}
+        self._concerns: dict[str, tuple[float, str]] = {}
         self._answer: dict[str, Any] = {}
         self._commands: Any = None  # where it answers
         best_effort = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -82,11 +76,10 @@ class FaultInjector:
     def _on_health(self, message: Any) -> None:
         for status in message.status:
             if status.level != DiagnosticStatus.OK:
-                level = int.from_bytes(status.level, "little")
-                self._concerns.setdefault(status.name, (time.monotonic(), level, status.message))
+                self._concerns.setdefault(status.name, (time.monotonic(), status.message))
 
     def concerns(self) -> dict[str, Any]:
-        """The first report of each node that was not OK: time, level and words."""
+        """The first report of each node that was not OK: time and words."""
         return {"concerns": self._concerns}
 
     def clear(self) -> dict[str, Any]:
