@@ -22,14 +22,12 @@ from lab.oracles.metamorphic import mirror, scaling
 from lab.oracles.motion import ledgers
 from lab.oracles.replay import AFTER, BEFORE, findings
 from lab.oracles.restart_check import digits, reversal, splitting
-from lab.oracles.rounding_bounds import DIED_OUT
 from lab.oracles.segments import Detail, Pieces, cut, detail, grid_of, pieces_of
 from lab.reference.grasp import commands
 
 MOST_EVENTS = 2000
 MOST_WORK = 100_000  # of a run
 CHEAP = 3_000  # work beyond which the relations that need more runs are left out
-OUTPUTS, ROUNDS = 201, 4  # of a run that stalls
 LIMIT = 100.0  # units of rounding
 UNITS = 4.0, 2.0, 0.5  # of length, time and mass
 SHALLOW = 1e-85  # m or m/s: below, what a touch moves, like u^3.5, may be denormal, and in other units other numbers
@@ -75,33 +73,19 @@ def examine(scene: Scene, every: bool = True, max_work: int = MOST_WORK, compare
             first = product.run(scene, None if scene.sampled else [0.0, scene.duration])
         except Unfinished:
             run = product.runs[-1]
-            return Examination(run.status.value, [_end(run, product)])
+            return Examination(run.status.value, [_end(run)])
         return Examination(first.status.value, list(_checks(first, product, every, compare)))
 
 
-def _end(run: Trajectory, product: Product) -> Check:
-    """Whether a run may end like this: out of budget, or stalled where a motion has died out."""
+def _end(run: Trajectory) -> Check:
+    """Whether a run may end like this: out of budget, or outside the domain if something drives it."""
     error = float(run.status in (Status.STALLED, Status.ENERGY_RISES, Status.ENERGY_FALLS, Status.PENETRATES))
-    if run.status is Status.STALLED:
-        error = float(_smallest_at_stall(run, product) > DIED_OUT)
     system = run.scene.system
     pushed = (system.closed_loop[:, Of.FORCE] != 0.0) & (system.closed_loop[:, Of.STIFFNESS] == 0.0)
     driven = run.sampled or bool(system.external) or pushed.any()  # any work: held commands, and steady forces
     if run.status is Status.NOT_FINITE or (run.status is Status.OUTSIDE and not driven):
         error = 1.0
     return Check(f"ends {run.status.name}", error, 0.0)
-
-
-def _smallest_at_stall(run: Trajectory, product: Product) -> float:
-    """The smallest number before a run stalls, which outputs come closer to from round to round."""
-    begin, end = 0.0, run.scene.duration
-    for _ in range(ROUNDS):
-        grid = np.linspace(begin, end, OUTPUTS)
-        with suppress(Unfinished):
-            product.run(run.scene, grid, run.sampled)
-        reached = max(len(product.runs[-1].t), 1)
-        begin, end = grid[reached - 1], grid[min(reached, OUTPUTS - 1)]
-    return _smallest(product.runs[-1])
 
 
 def _checks(first: Trajectory, product: Product, every: bool, compare: bool) -> Iterator[Check]:
@@ -139,7 +123,7 @@ def _related_runs(close: Detail, first: Trajectory, product: Product, every: boo
             if (error := relation()) is not None:
                 yield Check(name, error, bound)
         except Unfinished:
-            yield _end(product.runs[-1], product)
+            yield _end(product.runs[-1])
 
 
 def _mirror(scene: Scene, product: Product) -> float | None:
