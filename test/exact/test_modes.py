@@ -596,6 +596,14 @@ def test_a_pair_whose_motion_has_died_out_rests(side: Body, mode: Pair, u: float
 
 
 @SIDES
+def test_an_arm_that_touches_nothing_moves_on_however_little(side: Body) -> None:
+    b = bench(side, 0.5 * DIED_OUT, 0.5 * DIED_OUT, Pair.ABSENT)
+    before = b.state.y.copy()
+    settle_pairs(b.plant, b.state, b.settings, b.out)
+    assert b.state.y.tobytes() == before.tobytes()
+
+
+@SIDES
 @pytest.mark.parametrize(("d", "mode", "options", "expected"), [
     (-2.0, Pair.CONTACT, {}, Pair.LEAVING), (-1.0, Pair.CONTACT, {}, Pair.CONTACT),
     (-2.0, Pair.CONTACT, {"push": 1.0}, Pair.CONTACT),

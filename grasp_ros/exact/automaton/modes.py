@@ -157,7 +157,8 @@ def end_begin(state: State, side: Body, out: Output) -> None:
 @inlined
 def end_motion(state: State, side: Body) -> None:
     """Put a pair at u = u' = 0 whose motion has died out: squares of it would have left the range of numbers."""
-    if abs(state.y[U.L + side]) < DIED_OUT and abs(approach(state.y, side)) < DIED_OUT:
+    dead = abs(state.y[U.L + side]) < DIED_OUT and abs(approach(state.y, side)) < DIED_OUT
+    if dead and state.mode[side] != Pair.ABSENT:
         keep_together(state, side)
 
 
