@@ -19,9 +19,9 @@ def error_against_time(scene: Scene, truth: Truth, records: Sequence[Record], ad
     with canvas.style():
         figure, axes = canvas.subplots(figsize=(8.0, 5.2))
         colors = colormaps[COLORS]
-        for place, (name, group) in enumerate(by_method(record for record in records if record.sound).items()):
+        for i, (name, group) in enumerate(by_method(record for record in records if record.sound).items()):
             axes.loglog([record.error for record in group], [1e3 * record.time for record in group], label=name,
-                        color=colors(place % 20), marker=MARKS[place % len(MARKS)], markersize=5, linewidth=1.0)
+                        color=colors(i % 20), marker=MARKS[i % len(MARKS)], markersize=5, linewidth=1.0)
         axes.axvspan(axes.get_xlim()[0], truth.uncertainty, color="0.9", zorder=0)
         axes.axvline(truth.uncertainty, color="0.5", linewidth=0.8, label="not known better\nin double precision")
         if error is not None:

@@ -33,6 +33,9 @@ DONE = "done"
 OURS = "grasp_ros"
 NOT_INSTALLED = "not installed"
 FINER = 10.0
+SECONDS = 40.0
+OTHERS = 3
+TIME, ERROR, ERROR_THEN_TIME = attrgetter("time"), attrgetter("error"), attrgetter("error", "time")
 
 
 class Truth(NamedTuple):
@@ -131,6 +134,9 @@ class Effort(NamedTuple):
     most: int  # repeats
 
 
+QUICK = Effort(patience=0.8, budget=0.03, most=5)
+
+
 class Record(NamedTuple):
     """What was measured."""
 
@@ -202,12 +208,6 @@ def record_of(
         scene.name, contender.family, contender.name, contender.knob, setting, error,
         statistics.median(warm) if warm else None, min(warm, default=None), len(warm), first,
         answer and answer.steps, answer and answer.right_hand_sides, answer and answer.touches, truth.touches, status)
-
-
-QUICK = Effort(patience=0.8, budget=0.03, most=5)
-SECONDS = 40.0
-OTHERS = 3
-TIME, ERROR, ERROR_THEN_TIME = attrgetter("time"), attrgetter("error"), attrgetter("error", "time")
 
 
 class Advice(NamedTuple):

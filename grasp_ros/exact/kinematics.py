@@ -26,7 +26,7 @@ def arm_of(y: Array, side: Body) -> tuple[float, float, float]:
 
 @kernel
 def rate_lanes(side: Body) -> tuple[int, int]:
-    """Places of the two velocities whose difference is u', (8)."""
+    """Indices of the two velocities whose difference is u', (8)."""
     return (V.L, V.O) if side == LEFT else (V.O, V.R)
 
 

@@ -34,7 +34,7 @@ class Plant(NamedTuple):
 BODY_NUMBERS, PAIR_NUMBERS = 12, 4
 COULOMB = 2 * BODY_NUMBERS + PAIR_NUMBERS  # its index in the block of a plant
 PLANT_NUMBERS, STATE_NUMBERS = COULOMB + 4, 20
-REST_PLACE = 17  # where `State.rest` begins in the block of a state
+REST_INDEX = 17  # where `State.rest` begins in the block of a state
 
 
 def plant_of(block: Array) -> Plant:
@@ -56,7 +56,7 @@ class State(NamedTuple):
 
 def state_of(block: Array, mode: Integers) -> State:
     """A state whose numbers are parts of a block (STATE_NUMBERS,)."""
-    return State(block[:8], mode, block[8:14], block[14:REST_PLACE], block[REST_PLACE:])
+    return State(block[:8], mode, block[8:14], block[14:REST_INDEX], block[REST_INDEX:])
 
 
 def new_state(*y: float) -> tuple[Array, Integers]:

@@ -39,7 +39,7 @@ class Law(IntEnum):
 
 
 class X(IntEnum):
-    """Places of the positions in a state, m."""
+    """Indices of the positions in a state, m."""
 
     L = 0
     O = 2  # noqa: E741
@@ -47,7 +47,7 @@ class X(IntEnum):
 
 
 class V(IntEnum):
-    """Places of the velocities, m/s."""
+    """Indices of the velocities, m/s."""
 
     L = 1
     O = 3  # noqa: E741
@@ -55,7 +55,7 @@ class V(IntEnum):
 
 
 class U(IntEnum):
-    """Places of the penetrations, m."""
+    """Indices of the penetrations, m."""
 
     L = 6
     R = 7

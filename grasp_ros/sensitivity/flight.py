@@ -29,7 +29,7 @@ Linear = tuple[float, float, float]  # what one unit of x, of v and of a constan
 
 
 class Flow(IntEnum):
-    """Places of the numbers of a body, each HALF behind the last: four of its flow, their derivatives by K and by C.
+    """Indices of the numbers of a body, each HALF behind the last: four of its flow, their derivatives by K and by C.
 
     The four are x by x, x by v, v by v and x by a constant acceleration. v by x is -K times the second, v by the
     acceleration is the second.
@@ -74,8 +74,8 @@ def write_flows(t: Tangents, span: float) -> None:
         push = nothing
     a, a_k, a_c = 1.0 - stiffness * q, nothing - q - stiffness * q_k, nothing - stiffness * q_c
     d, d_k, d_c = a - damping * s, a_k - damping * s_k, a_c - s - damping * s_c
-    for place, number in enumerate((a, s, d, q, a_k, s_k, d_k, q_k, a_c, s_c, d_c, q_c)):
-        store(t.flows, HALF * place, number)
+    for i, number in enumerate((a, s, d, q, a_k, s_k, d_k, q_k, a_c, s_c, d_c, q_c)):
+        store(t.flows, HALF * i, number)
 
 
 @kernel

@@ -59,7 +59,7 @@ ROWS = Row.GAIN + 3
 
 
 class Count(IntEnum):
-    """Places of the whole numbers."""
+    """Indices of the whole numbers."""
 
     FILLED = 0  # outputs
     TICK = 1  # whose inputs act; -1: none yet
@@ -69,7 +69,7 @@ class Count(IntEnum):
 
 
 class Number(IntEnum):
-    """Places of the numbers."""
+    """Indices of the numbers."""
 
     TIME = 0  # up to which the tangents are known, s
     PERIOD = 1  # control period, s

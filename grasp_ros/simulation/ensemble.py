@@ -51,7 +51,7 @@ class Table(Frozen):
     columns : dict of str to array (n,)
         Outcomes by the names of `outcomes.OUTCOMES`, and derivatives; nan in rows that were refused or stopped.
     status : array (n,)
-        Places in `STATUSES`.
+        Indices of `STATUSES`.
     stops : dict of int to str
         Why and where a row was refused or stopped, or why it has no derivatives.
     """

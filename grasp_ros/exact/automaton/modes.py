@@ -225,7 +225,7 @@ def make_transition(plant: Plant, state: State, side: Body, kind: Transition, le
     """
     y, mode, d, opposite = state.y, state.mode, approach(state.y, side), other(side)
     if kind in (Transition.TOUCH, Transition.RELEASE):
-        meet(state, side)  # the places agree but for rounding
+        meet(state, side)  # the positions agree but for rounding
     if kind == Transition.TOUCH and d <= 0.0:
         copy(state, velocity_lane(side), V.O)
         return

@@ -55,7 +55,7 @@ class VectorModel(models.PrimitiveModel):
 
 
 def _quads(builder: Any, kind: Any, value: Any, count: int) -> list[Any]:
-    """The registers of a vector, or a number in each place of as many."""
+    """The registers of a vector, or a number in each lane of as many."""
     if isinstance(kind, Vector):
         return [builder.extract_value(value, i) for i in range(count)]
     nothing = ir.Constant(QUAD, ir.Undefined)
